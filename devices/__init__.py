@@ -1,0 +1,1 @@
+"""The rig: cameras, laser, range finder; recorded rigs; the simulated world."""

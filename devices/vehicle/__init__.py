@@ -1,0 +1,1 @@
+"""The simulated vehicle: flight dynamics, an autopilot like PX4, and MAVLink."""

@@ -1,0 +1,1 @@
+"""Knowledge to motion: frames of reference, guidance, gimbal, autopilot link and pre-flight checks."""

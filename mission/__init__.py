@@ -1,0 +1,1 @@
+"""What happens next: the mission language, its executive, the behaviours and the record of a run."""

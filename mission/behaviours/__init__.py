@@ -1,0 +1,1 @@
+"""One module per behaviour: what a state of a mission may do."""

@@ -1,0 +1,79 @@
+"""What a behaviour is: a coroutine with typed parameters and declared outcomes, registered under the name of its module."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+if TYPE_CHECKING:
+    from mission.executive.services import Services
+
+
+class Parameters(BaseModel):
+    """Base of every behaviour's parameters: frozen, nothing unknown; fields carry units in their names, limits and text."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class NoParameters(Parameters):
+    """For behaviours that need nothing said."""
+
+
+P = TypeVar("P", bound=Parameters)
+Run = Callable[["Services", Any], Awaitable[str]]
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """One entry of the registry.
+
+    outcomes: name → what it means, the only values `run` may return. airborne: it expects to be flying while it runs, or
+    None where it does not care. needs_vision: it cannot work without images.
+    """
+
+    name: str
+    run: Run
+    parameters: type[Parameters]
+    outcomes: Mapping[str, str]
+    airborne: bool | None
+    needs_vision: bool
+    text: str
+
+
+_REGISTRY: dict[str, Behaviour] = {}
+
+
+def behaviour(
+    *,
+    outcomes: Mapping[str, str],
+    parameters: type[Parameters] = NoParameters,
+    airborne: bool | None = True,
+    needs_vision: bool = False,
+) -> Callable[[Callable[[Services, P], Awaitable[str]]], Callable[[Services, P], Awaitable[str]]]:
+    """Register a coroutine as the behaviour of its own name. Its docstring is what users read in `mission list behaviours`."""
+
+    def register(run: Callable[[Services, P], Awaitable[str]]) -> Callable[[Services, P], Awaitable[str]]:
+        name = run.__name__
+        if name in _REGISTRY and _REGISTRY[name].run.__module__ != run.__module__:
+            raise ValueError(f"behaviour {name!r} is declared in {_REGISTRY[name].run.__module__} and {run.__module__}")
+        _REGISTRY[name] = Behaviour(
+            name, run, parameters, dict(outcomes), airborne, needs_vision, (run.__doc__ or "").strip()
+        )
+        return run
+
+    return register
+
+
+@cache
+def behaviours() -> Mapping[str, Behaviour]:
+    """Every behaviour of the package, by name: each module beside this one is imported, so adding a file is enough."""
+    package = __name__.rpartition(".")[0]
+    for module in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        importlib.import_module(f"{package}.{module.name}")
+    return dict(sorted(_REGISTRY.items()))

@@ -1,0 +1,1 @@
+"""The machine that carries a mission out: events, deadlines, monitors, clock and journal."""

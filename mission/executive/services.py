@@ -1,0 +1,115 @@
+"""What a behaviour is given to work with: everything it may touch, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from flight.keepout import KeepOut
+    from flight.turbine import Turbine
+
+    from flight.autopilot import Autopilot, Setpoint
+    from mission.executive.clock import Clock
+    from mission.language.document import Mission
+    from vision.estimate import BladeEstimate
+    from vision.observation import BladeObservation, FarView
+
+
+class RaiseEvent(Protocol):
+    """Queue an event of the event table, with data for the journal. Safe from any coroutine of the loop."""
+
+    def __call__(self, name: str, **data: Any) -> None: ...
+
+
+class SetpointStream(Protocol):
+    """Streams the target at a fixed rate for as long as the executive is alive, bounded by the keep-out volume."""
+
+    target: Setpoint | None
+
+    async def start(self, first: Setpoint) -> None:
+        """Begin with a first target and switch the autopilot to OFFBOARD."""
+        ...
+
+    def stop(self) -> None:
+        """Stop streaming; the autopilot must already have been given another mode."""
+        ...
+
+
+class Perception(Protocol):
+    """The vision loop: it runs at its own rate and never delays the setpoints."""
+
+    observation: BladeObservation | None
+
+    def estimate(self) -> BladeEstimate | None:
+        """The tracked blade predicted to now and seen from the present pose; None before it was first seen."""
+        ...
+
+    async def next_observation(self) -> BladeObservation:
+        """Wait for the next cycle and return its observation, valid or refused."""
+        ...
+
+    async def far_view(self) -> FarView:
+        """Take one picture without laser and look for the rotor."""
+        ...
+
+    def watch_blade(self, on: bool) -> None:
+        """Start or stop the close-up cycle (laser, stereo, tracker)."""
+        ...
+
+    def forget(self) -> None:
+        """Make the tracker forget what it saw, as after a change of side."""
+        ...
+
+    def record(self, side: str | None) -> None:
+        """Record frames of this side from now on; None stops recording."""
+        ...
+
+
+@dataclass
+class Progress:
+    """What the live view shows of the behaviour that runs; behaviours write it, nobody reads decisions from it."""
+
+    text: str = ""
+    station_m: float | None = None
+
+
+@dataclass
+class Memory:
+    """What behaviours have found out and later ones rely on. It is journalled at every transition and comes back on resume."""
+
+    home: tuple[float, float, float] | None = None
+    hub: tuple[float, float, float] | None = None
+    heading: float | None = None
+    azimuth: float | None = None
+    tip_station_m: float | None = None
+    root_station_m: float | None = None
+    passes_done: list[str] = field(default_factory=list)
+    values: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Services:
+    """One run's services. `turbine` is what is believed of the turbine, refined by the survey; never the simulated truth."""
+
+    clock: Clock
+    autopilot: Autopilot
+    setpoints: SetpointStream
+    perception: Perception
+    turbine: Turbine
+    keep_out: KeepOut
+    mission: Mission
+    raise_event: RaiseEvent
+    log: Any
+    rig: Any = None
+    progress: Progress = field(default_factory=Progress)
+    memory: Memory = field(default_factory=Memory)
+    on_turbine_refined: Callable[[Turbine], None] | None = None
+
+    async def ticks(self, rate_hz: float = 20.0) -> AsyncIterator[float]:
+        """Yield the mission time `rate_hz` times a wall second: the control rate does not fall when time runs faster."""
+        period = self.clock.speed / rate_hz
+        while True:
+            yield self.clock.now()
+            await self.clock.sleep(period)

@@ -1,0 +1,1 @@
+"""Mission files: typed, checked line by line, proven and drawn."""
