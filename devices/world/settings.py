@@ -38,12 +38,8 @@ class Gps(_Section):
     offset_north_m: float = Field(0.0, ge=-20, le=20, description="Constant error, north.")
     offset_east_m: float = Field(0.0, ge=-20, le=20, description="Constant error, east.")
     offset_down_m: float = Field(0.0, ge=-20, le=20, description="Constant error, down.")
-    drift_m_min: float = Field(
-        0.15, ge=0, le=10, description="Random walk: standard deviation after one minute, each axis."
-    )
-    noise_m: float = Field(
-        0.01, ge=0, le=2, description="Jitter of the estimator's output, standard deviation, each axis."
-    )
+    drift_m_min: float = Field(0.15, ge=0, le=10, description="Random walk of each axis: sigma after a minute.")
+    noise_m: float = Field(0.01, ge=0, le=2, description="Jitter of the estimate on each axis, sigma.")
 
 
 class Light(_Section):
@@ -139,7 +135,7 @@ class Blocked(Window):
 
 
 class Faults(_Section):
-    """Faults that a user can rehearse; each is off unless given. `--set world.faults.images.every_s=20` switches one on."""
+    """Faults that a user can rehearse; off unless given. `--set world.faults.images.every_s=20` switches one on."""
 
     images: Window | None = Field(None, description="No images at all.")
     blackout: Window | None = Field(None, description="No images at all; a second switch beside `images`.")
