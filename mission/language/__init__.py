@@ -1,1 +1,1 @@
-"""Mission files: typed, checked line by line, proven and drawn."""
+"""The mission file: typed document, YAML loading with line numbers, checks, proof, scenario tests, diagram."""

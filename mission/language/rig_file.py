@@ -1,0 +1,72 @@
+"""What flies and what looks: vehicle connection, cameras, laser, gimbal: `rigs/*.yaml`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from mission.language.file_model import Degrees, FileModel, Vector
+
+
+class CameraSection(FileModel):
+    """A stereo pair of equal cameras side by side; a calibrated pair is given as `camchain:` instead."""
+
+    width: int = Field(ge=64, le=10000, description="Pixels across.")
+    height: int = Field(ge=64, le=10000, description="Pixels down.")
+    focal_px: float = Field(gt=10, le=50000, description="Focal length in pixels.")
+    baseline_m: float = Field(gt=0.005, le=5, description="Distance between the lenses.")
+    distortion: tuple[float, float, float, float] = Field(
+        (0.0, 0.0, 0.0, 0.0), description="Radial-tangential distortion k1, k2, p1, p2, as Kalibr and OpenCV write it."
+    )
+
+
+class LaserSection(FileModel):
+    """The laser that throws a grid of dots."""
+
+    rows: int = Field(11, ge=2, le=101, description="Dots from top to bottom.")
+    columns: int = Field(11, ge=2, le=101, description="Dots from left to right.")
+    fan_deg: float = Field(28.2, gt=1, le=120, description="Full angle of the grid, across and down.")
+    position_m: Vector = Field((0.0, 0.0, 0.0), description="In the left camera's frame: forward, right, down.")
+    rotation_deg: Vector = Field(
+        (0.0, 0.0, 0.0), description="Roll, pitch, yaw of the laser's axes in the left camera's frame."
+    )
+
+
+class RigFile(FileModel):
+    """One rig. `kind` chooses the driver; the rest is geometry and how to reach the vehicle."""
+
+    kind: Literal["simulated", "px4_sitl", "recorded", "hardware"] = Field(
+        description="simulated: embedded simulator. px4_sitl: images drawn from the pose that PX4 SITL reports. "
+        "recorded: images from a run's folder. hardware: a real vehicle."
+    )
+    system: str = Field(
+        "embedded",
+        pattern=r"^(embedded|(udpin|udpout|udp|tcpin|tcpout|tcp|serial)://\S+)$",
+        description="embedded, or a MAVSDK connection such as udpin://0.0.0.0:14540.",
+    )
+    speed: float = Field(
+        1.0, gt=0, le=100, description="Mission seconds per wall second; only a simulator can be faster."
+    )
+    mount_m: Vector = Field((0.0, 0.0, 0.0), description="The left lens in body axes: forward, right, down.")
+    camera: CameraSection | None = Field(None, description="The stereo pair by its data sheet.")
+    camchain: str | None = Field(None, description="The stereo pair as calibrated: a Kalibr camchain beside this file.")
+    laser: LaserSection | None = Field(None, description="None: a rig without structured light.")
+    gimbal: Literal["autopilot", "in_process"] = Field(
+        "autopilot", description="autopilot: its gimbal manager. in_process: a gimbal simulated beside the cameras."
+    )
+    gimbal_pitch_deg: tuple[Degrees, Degrees] = Field((-90.0, 60.0), description="Lowest and highest pitch it reaches.")
+    frames: str | None = Field(None, description="Folder of the recorded frames, beside this file; only kind recorded.")
+    confirm_arming: bool | None = Field(None, description="Ask before arming; by default for kind hardware alone.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> RigFile:
+        if (self.camera is None) == (self.camchain is None):
+            raise ValueError("give exactly one of camera and camchain")
+        if self.system == "embedded" and self.kind in ("px4_sitl", "hardware"):
+            raise ValueError(f"kind {self.kind} needs system: a MAVSDK connection such as udpin://0.0.0.0:14540")
+        if (self.frames is None) == (self.kind == "recorded"):
+            raise ValueError("frames belongs to kind recorded, and recorded needs it")
+        if self.speed != 1.0 and self.kind == "hardware":
+            raise ValueError("speed must be 1 for real hardware")
+        return self
