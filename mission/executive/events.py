@@ -33,7 +33,7 @@ class EventError(ValueError):
 class Event:
     """One line of the table.
 
-    raised_by: behaviour, monitor, deadline, operator or executive. falls_back_to: the event that is tried where no state
+    raised_by: behaviour, monitor, deadline, operator or executive. falls_back_to: the event tried where no state
     on the path handles this one; None means that it is then journalled and otherwise ignored.
     lets_go: no setpoint may follow it, because somebody else flies now.
     """

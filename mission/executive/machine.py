@@ -1,0 +1,150 @@
+"""The mission compiled to the `transitions` library: it holds the active state and walks the hierarchy.
+
+Names, targets and guards have been proven sound before; the library would not notice. History, retries and the chain of
+events that one event falls back to are put into the compiled machine as further guarded transitions, so that the library
+answers exactly as `mission.language.semantics` says. The two are held against each other at every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from transitions.extensions.asyncio import HierarchicalAsyncMachine, NestedAsyncState
+
+from mission.executive.events import fallbacks
+from mission.language import semantics
+from mission.language.document import Mission, Transition, enclosing
+from mission.language.semantics import Configuration, Quantities, Step
+
+
+class MachineError(RuntimeError):
+    """The library and the rules of the language disagree: an error of this program, never of a mission."""
+
+
+class _State(NestedAsyncState):  # type: ignore[misc]
+    separator = "."
+
+
+class _Library(HierarchicalAsyncMachine):  # type: ignore[misc]
+    state_cls = _State
+
+
+class _Position:
+    """The library's model: it keeps `state`, the path of the active leaf."""
+
+    state: str
+
+
+class Machine:
+    """One run's machine. `configuration` is where it is; `take` is the only way to move it."""
+
+    def __init__(self, mission: Mission, configuration: Configuration | None = None) -> None:
+        """Compile a mission and stand in a configuration of it; without one, where the mission begins."""
+        self.mission = mission
+        self.configuration = configuration or semantics.start(mission)
+        self._position = _Position()
+        self._quantities: Quantities = {}
+        self._origin: str | None = None
+        self._only: Transition | None = None
+        self._taken: Transition | None = None
+        self._library = _Library(
+            model=self._position,
+            states=[self._compiled(path) for path, state in mission.states.items() if state.parent is None],
+            transitions=list(self._transitions()),
+            initial=self.configuration.leaf,
+            send_event=True,
+            auto_transitions=False,
+            ignore_invalid_triggers=True,
+            queued=False,
+        )
+
+    @property
+    def state(self) -> str:
+        """Path of the active leaf."""
+        return self._position.state
+
+    def choose(self, event: str, quantities: Quantities, origin: str | None = None) -> Transition | None:
+        """The transition that would answer an event now; None where nothing does."""
+        return semantics.choose(self.mission, self.configuration, event, quantities, origin)
+
+    async def take(
+        self, event: str, quantities: Quantities, origin: str | None = None, only: Transition | None = None
+    ) -> Step | None:
+        """Let the event happen: the transition that answers it is carried out. None where nothing answers.
+
+        only: the one transition that may be taken, where its delay has passed or the operator has agreed to it.
+
+        Raises:
+            MachineError: the library ended elsewhere than the rules say.
+        """
+        before = self.configuration
+        self._quantities, self._origin, self._only, self._taken = quantities, origin, only, None
+        for name in fallbacks(event):
+            if name in self._library.events and await self._position.trigger(name):  # type: ignore[attr-defined]
+                break
+        transition = self._taken
+        if transition is None:
+            return None
+        step = semantics.take(self.mission, before, transition, event)
+        if self.state != step.after.leaf:
+            raise MachineError(
+                f"{event} in {before.leaf}: the machine went to {self.state}, the rules say {step.after.leaf}"
+            )
+        self.configuration = step.after
+        return step
+
+    def _compiled(self, path: str) -> dict[str, Any]:
+        state = self.mission.states[path]
+        compiled: dict[str, Any] = {"name": state.name, "final": state.final is not None}
+        if state.children:
+            compiled["children"] = [self._compiled(child) for child in state.children]
+            compiled["initial"] = (state.initial or state.children[0]).removeprefix(path + ".")
+        return compiled
+
+    def _transitions(self) -> Iterator[dict[str, Any]]:
+        """Inner entries stand on their own states; the mission's own `on` on every outermost state, after its entries."""
+        outermost = [path for path, state in self.mission.states.items() if state.parent is None]
+        for state in self.mission.states.values():
+            for transition in state.on:
+                yield from self._variants(state.path, transition)
+        for path in outermost:
+            for transition in self.mission.on:
+                yield from self._variants(path, transition)
+
+    def _variants(self, source: str, transition: Transition) -> Iterator[dict[str, Any]]:
+        """One transition of the library for each leaf in which it may end: one, or with history one per remembered leaf."""
+        for leaf in self._ends(transition):
+            yield {
+                "trigger": transition.event,
+                "source": source,
+                "dest": leaf,
+                "conditions": [partial(self._may, source, transition, leaf)],
+                "before": partial(self._take, transition),
+            }
+
+    def _ends(self, transition: Transition) -> tuple[str, ...]:
+        target, mission = transition.target, self.mission
+        first = mission.leaf(target)
+        if transition.history is None or not mission.states[target].children:
+            return (first,)
+        if transition.history == "shallow":
+            others = {mission.leaf(child) for child in mission.states[target].children}
+        else:
+            others = {leaf for leaf in mission.leaves() if target in enclosing(leaf)}
+        return (first, *sorted(others - {first}))
+
+    def _may(self, source: str, transition: Transition, leaf: str, event_data: Any) -> bool:
+        if self._taken is not None or (self._only is not None and transition.key != self._only.key):
+            return False
+        if self._origin is not None and source not in enclosing(self._origin):
+            return False
+        if semantics.used_up(transition, self.configuration):
+            return False
+        if not semantics.guards_hold(transition, self._quantities):
+            return False
+        return semantics.entered_leaf(self.mission, self.configuration, transition) == leaf
+
+    def _take(self, transition: Transition, event_data: Any) -> None:
+        self._taken = transition
