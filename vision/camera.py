@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -58,6 +57,8 @@ class Camera:
         if len(pixels) == 0:
             return np.empty((0, 3))
         if any(self.distortion):
+            import cv2  # here, so that checking a mission file does not load OpenCV
+
             yz = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, np.array(self.distortion)).reshape(-1, 2)
         else:
             yz = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)

@@ -1,4 +1,4 @@
-"""What a behaviour is: a coroutine with typed parameters and declared outcomes, registered under the name of its module."""
+"""What a behaviour is: a coroutine with typed parameters and declared outcomes, registered by name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Parameters(BaseModel):
-    """Base of every behaviour's parameters: frozen, nothing unknown; fields carry units in their names, limits and text."""
+    """Base of every behaviour's parameters: frozen, nothing unknown; fields carry units, limits and text."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -33,8 +33,8 @@ Run = Callable[["Services", Any], Awaitable[str]]
 class Behaviour:
     """One entry of the registry.
 
-    outcomes: name → what it means, the only values `run` may return. airborne: it expects to be flying while it runs, or
-    None where it does not care. needs_vision: it cannot work without images.
+    outcomes: name → what it means, the only values `run` may return. airborne: it expects to be flying while it runs,
+    or None where it does not care. needs_vision: it cannot work without images.
     """
 
     name: str
@@ -56,7 +56,7 @@ def behaviour(
     airborne: bool | None = True,
     needs_vision: bool = False,
 ) -> Callable[[Callable[[Services, P], Awaitable[str]]], Callable[[Services, P], Awaitable[str]]]:
-    """Register a coroutine as the behaviour of its own name. Its docstring is what users read in `mission list behaviours`."""
+    """Register a coroutine as the behaviour of its own name; users read its docstring in `mission list behaviours`."""
 
     def register(run: Callable[[Services, P], Awaitable[str]]) -> Callable[[Services, P], Awaitable[str]]:
         name = run.__name__

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
+    from flight.autopilot import Autopilot, Setpoint
     from flight.keepout import KeepOut
     from flight.turbine import Turbine
-
-    from flight.autopilot import Autopilot, Setpoint
     from mission.executive.clock import Clock
+    from mission.executive.perception import FarSight
     from mission.language.document import Mission
-    from vision.estimate import BladeEstimate
-    from vision.observation import BladeObservation, FarView
+    from vision.estimate import BladeEstimate, BladeFrame
+    from vision.landmarks import TipSighting
+    from vision.observation import BladeObservation
 
 
 class RaiseEvent(Protocol):
@@ -27,6 +28,7 @@ class SetpointStream(Protocol):
     """Streams the target at a fixed rate for as long as the executive is alive, bounded by the keep-out volume."""
 
     target: Setpoint | None
+    keep_out: KeepOut | None
 
     async def start(self, first: Setpoint) -> None:
         """Begin with a first target and switch the autopilot to OFFBOARD."""
@@ -41,6 +43,12 @@ class Perception(Protocol):
     """The vision loop: it runs at its own rate and never delays the setpoints."""
 
     observation: BladeObservation | None
+    frame: BladeFrame
+    tips: Sequence[TipSighting]
+
+    def chord(self, station_m: float) -> float | None:
+        """Chord (m) at a station from all edges seen so far; None where one of them was not."""
+        ...
 
     def estimate(self) -> BladeEstimate | None:
         """The tracked blade predicted to now and seen from the present pose; None before it was first seen."""
@@ -50,8 +58,8 @@ class Perception(Protocol):
         """Wait for the next cycle and return its observation, valid or refused."""
         ...
 
-    async def far_view(self) -> FarView:
-        """Take one picture without laser and look for the rotor."""
+    async def far_view(self) -> FarSight:
+        """Take one picture without laser and look for the rotor; with the pose it was taken from."""
         ...
 
     def watch_blade(self, on: bool) -> None:
@@ -98,14 +106,21 @@ class Services:
     setpoints: SetpointStream
     perception: Perception
     turbine: Turbine
-    keep_out: KeepOut
     mission: Mission
     raise_event: RaiseEvent
     log: Any
     rig: Any = None
     progress: Progress = field(default_factory=Progress)
     memory: Memory = field(default_factory=Memory)
-    on_turbine_refined: Callable[[Turbine], None] | None = None
+    locate: Callable[[Sequence[FarSight]], Turbine | None] = lambda sights: None
+    on_turbine_refined: Callable[[Turbine], None] = lambda turbine: None
+
+    def refine_turbine(self, turbine: Turbine) -> None:
+        """Believe another turbine from now on: keep-out, tracker and monitors follow."""
+        self.turbine = turbine
+        self.memory.hub = (float(turbine.hub[0]), float(turbine.hub[1]), float(turbine.hub[2]))
+        self.memory.heading, self.memory.azimuth = turbine.heading, turbine.azimuth
+        self.on_turbine_refined(turbine)
 
     async def ticks(self, rate_hz: float = 20.0) -> AsyncIterator[float]:
         """Yield the mission time `rate_hz` times a wall second: the control rate does not fall when time runs faster."""

@@ -1,0 +1,51 @@
+"""Turn the camera until it looks squarely at the surface."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mission.behaviours.behaviour import Parameters, behaviour
+from mission.behaviours.motion import wrap
+
+if TYPE_CHECKING:
+    from mission.executive.services import Services
+
+
+class AlignGimbal(Parameters):
+    """Parameters of `align_gimbal`."""
+
+    side: Literal["leading", "trailing"] = Field("leading", description="the edge that will be followed")
+    standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to hold meanwhile")
+    tolerance_deg: float = Field(4.0, gt=0, le=20, description="gimbal error at which it counts as aligned")
+    steady_s: float = Field(1.0, gt=0, le=10, description="for so long")
+
+
+@behaviour(
+    outcomes={"aligned": "the camera looks squarely at the blade, the edge in view"},
+    parameters=AlignGimbal,
+    needs_vision=True,
+)
+async def align_gimbal(services: Services, parameters: AlignGimbal) -> str:
+    """Hold at the standoff, bring the edge into view, and point the gimbal along the surface's normal."""
+    from mission.behaviours.following import Following
+
+    following = Following(services, side=parameters.side, toward="tip", standoff_m=parameters.standoff_m)
+    good_since: float | None = None
+    async for now in services.ticks():
+        steered = following.tick(now)
+        if steered is None:
+            continue
+        estimate, command = steered
+        pose = services.autopilot.telemetry.pose
+        error = np.hypot(wrap(float(pose.gimbal[0]) - command.gimbal_yaw), pose.gimbal[1] - command.gimbal_pitch)
+        side = following.side(estimate)
+        seen = side is not None and side.age_s < 0.6
+        services.progress.text = f"gimbal {np.degrees(error):.1f}° off, edge {'seen' if seen else 'not seen'}"
+        good = seen and error < np.deg2rad(parameters.tolerance_deg) and estimate.age_s < 0.6
+        good_since = (good_since if good_since is not None else now) if good else None
+        if good_since is not None and now - good_since >= parameters.steady_s:
+            return "aligned"
+    raise AssertionError("ticks never end")

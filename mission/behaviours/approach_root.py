@@ -1,0 +1,94 @@
+"""From the survey's distance to the blade's root, slower the nearer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field
+
+from flight.autopilot import Setpoint
+from mission.behaviours.behaviour import Parameters, behaviour
+from mission.behaviours.motion import approach, fly_to
+
+if TYPE_CHECKING:
+    from mission.executive.services import Services
+    from vision.estimate import BladeEstimate
+
+
+class ApproachRoot(Parameters):
+    """Parameters of `approach_root`."""
+
+    standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to the blade at the end")
+    stage_m: float = Field(9.0, ge=6, le=20, description="distance at which the creeping begins")
+    station_m: float = Field(4.0, ge=2, le=15, description="where along the blade, from the hub's centre")
+    speed_m_s: float = Field(4.0, gt=0, le=8, description="speed to the staging point")
+    creep_m_s: float = Field(0.6, gt=0, le=1.5, description="speed from there on")
+
+
+SEEN_S = 1.0  # the blade must have been tracked without a break for so long before the approach relies on it
+
+
+@behaviour(
+    outcomes={"arrived": "in front of the root at the standoff", "not_found": "no blade where it should be"},
+    parameters=ApproachRoot,
+    needs_vision=True,
+)
+async def approach_root(services: Services, parameters: ApproachRoot) -> str:
+    """Fly in front of the blade's root, then creep toward it until the blade is seen, measured and three metres away.
+
+    Until the cameras measure the blade, the range finder limits how near the vehicle goes.
+    """
+    turbine = services.turbine
+    frame = turbine.blade_frame()
+    ahead = turbine.axes()[0] * np.array([1.0, 1.0, 0.0])
+    ahead /= np.linalg.norm(ahead)
+    root = frame.to_ned(np.array([parameters.station_m, 0.0, 0.0]))
+    yaw = float(np.arctan2(ahead[1], ahead[0]))
+    stage = root - ahead * (parameters.stage_m + 1.0)
+    services.progress.text = "to the staging point"
+    await fly_to(services, stage, yaw, speed_m_s=parameters.speed_m_s, tolerance_m=0.7)
+
+    services.perception.watch_blade(True)
+    nearest = root - ahead * (turbine.hub_sigma_m + 1.5)
+    seen_since: float | None = None
+    last = services.clock.now()
+    carrot = stage.copy()
+    async for now in services.ticks():
+        elapsed, last = now - last, now
+        estimate = services.perception.estimate()
+        telemetry = services.autopilot.telemetry
+        fresh = estimate is not None and estimate.age_s < 0.7 and estimate.distance_sigma_m < 0.3
+        seen_since = (seen_since if seen_since is not None else now) if fresh else None
+        services.autopilot.point_gimbal(yaw, 0.0)
+        if estimate is not None and seen_since is not None and now - seen_since >= SEEN_S:
+            excess = _excess(estimate, telemetry.range_m, parameters.standoff_m)
+            services.progress.text = f"blade at {estimate.nearest_m:.2f} m"
+            services.progress.station_m = estimate.station_m
+            goal = telemetry.pose.position + ahead * excess
+            goal = goal + _centring(root, goal, ahead)
+            carrot = approach(carrot, goal, parameters.creep_m_s * elapsed)
+            if abs(excess) < 0.25 and np.linalg.norm(telemetry.pose.velocity) < 0.3:
+                return "arrived"
+        else:
+            services.progress.text = "creeping toward the blade, not seen yet"
+            room = np.inf if telemetry.range_m is None else telemetry.range_m - (parameters.standoff_m + 0.5)
+            if room > 0:
+                carrot = approach(carrot, nearest, parameters.creep_m_s * elapsed)
+            if np.linalg.norm(carrot - nearest) < 0.05 and np.linalg.norm(telemetry.pose.velocity) < 0.2:
+                return "not_found"
+        services.setpoints.target = Setpoint(carrot.copy(), yaw)
+    raise AssertionError("ticks never end")
+
+
+def _excess(estimate: BladeEstimate, range_m: float | None, standoff_m: float) -> float:
+    """How much too far away the vehicle is, by whatever is nearest."""
+    nearest = estimate.nearest_m if range_m is None else min(estimate.nearest_m, range_m + 0.15)
+    return nearest - standoff_m
+
+
+def _centring(root: np.ndarray, goal: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """Sideways and vertical way (3,) from the goal to the line of approach through the root."""
+    off = root - goal
+    result: np.ndarray = off - (off @ ahead) * ahead
+    return result

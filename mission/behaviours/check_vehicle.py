@@ -1,0 +1,29 @@
+"""Before anything turns: is the vehicle fit to fly beside a turbine?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mission.behaviours.behaviour import NoParameters, behaviour
+
+if TYPE_CHECKING:
+    from mission.executive.services import Services
+
+
+@behaviour(
+    outcomes={"passed": "nothing speaks against flying", "failed": "a finding forbids it; the journal says which"},
+    airborne=False,
+)
+async def check_vehicle(services: Services, parameters: NoParameters) -> str:
+    """Check health, battery, failsafe parameters and the rig; refuse what would hurt beside a turbine."""
+    from flight.preflight import check
+
+    while not services.autopilot.telemetry.armable:
+        services.progress.text = "waiting until the vehicle can be armed"
+        await services.clock.sleep(0.5)
+    findings = await check(services.autopilot, services.mission.limits, services.clock.speed)
+    for finding in findings:
+        services.log.info("preflight", code=finding.code, level=finding.level, text=finding.text, remedy=finding.remedy)
+    refusals = [finding for finding in findings if finding.level == "refuse"]
+    services.progress.text = "; ".join(f"{f.text}: {f.remedy}" for f in refusals) or "fit to fly"
+    return "failed" if refusals else "passed"

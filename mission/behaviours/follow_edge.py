@@ -1,0 +1,98 @@
+"""Along the blade on one of its sides, camera on the edge, until its end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mission.behaviours.behaviour import Parameters, behaviour
+from vision.landmarks import RootWatch, agreed_tip
+
+if TYPE_CHECKING:
+    from mission.executive.services import Services
+    from vision.estimate import BladeEstimate
+
+
+class FollowEdge(Parameters):
+    """Parameters of `follow_edge`."""
+
+    side: Literal["leading", "trailing"] = Field(description="which edge")
+    toward: Literal["tip", "root"] = Field(description="which way")
+    standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to the nearest point of the blade")
+    speed_m_s: float = Field(0.8, gt=0, le=2, description="speed along the blade")
+    record: bool = Field(True, description="whether frames are kept for the inspector")
+
+
+EDGE_PATIENCE_S = 4.0  # the wanted edge unseen for so long, though the blade is seen
+TIP_WINDOW_S = 2.0
+PAST_TIP_M = 1.5  # beyond the expected tip nothing is followed
+ROOT_MARGIN_M = 4.0  # the root's beginning is expected inside the root radius plus this
+NEAREST_ROOT_M = 2.6  # never nearer to the hub's centre than this
+
+
+@behaviour(
+    outcomes={
+        "tip_detected": "several sightings of a tip agree",
+        "root_detected": "the chord has fallen and the position confirms the root",
+        "edge_lost": "the blade is seen, the wanted edge is not; or the blade is longer than it should be",
+    },
+    parameters=FollowEdge,
+    needs_vision=True,
+)
+async def follow_edge(services: Services, parameters: FollowEdge) -> str:
+    """Follow the leading or trailing edge toward tip or root at the standoff, slower as the images grow old.
+
+    On two edges where both fit into the view, on one where not, back over the edge where the camera has slipped off it.
+    """
+    from mission.behaviours.following import Following
+
+    perception = services.perception
+    following = Following(
+        services,
+        side=parameters.side,
+        toward=parameters.toward,
+        standoff_m=parameters.standoff_m,
+        speed_m_s=parameters.speed_m_s,
+    )
+    perception.record(parameters.side if parameters.record else None)
+    root = RootWatch(services.turbine.root_radius_m + ROOT_MARGIN_M)
+    started = services.clock.now()
+    try:
+        async for now in services.ticks():
+            steered = following.tick(now)
+            if steered is None:
+                continue
+            estimate, command = steered
+            services.progress.text = f"{parameters.side} edge toward the {parameters.toward}, {command.mode}"
+            side = following.side(estimate)
+            unseen_s = np.inf if side is None else side.age_s - estimate.age_s
+            if now - started > EDGE_PATIENCE_S and unseen_s > EDGE_PATIENCE_S:
+                return "edge_lost"
+            if parameters.toward == "tip":
+                if agreed_tip(perception.tips, max(started, now - TIP_WINDOW_S)) is not None:
+                    services.memory.passes_done.append(parameters.side)
+                    return "tip_detected"
+                if estimate.station_m > services.turbine.tip_radius_m + PAST_TIP_M:
+                    return "edge_lost"
+            elif _at_root(services, root, estimate):
+                services.memory.passes_done.append(parameters.side)
+                return "root_detected"
+    finally:
+        perception.record(None)
+    raise AssertionError("ticks never end")
+
+
+def _at_root(services: Services, root: RootWatch, estimate: BladeEstimate) -> bool:
+    """Whether the way back ends here: the chord's fall near the hub, or, at the latest, the least radius."""
+    fallen = root.update(estimate.station_m, services.perception.chord(estimate.station_m))
+    if fallen is not None and estimate.station_m <= services.turbine.root_radius_m + ROOT_MARGIN_M - 1.5:
+        services.memory.root_station_m = fallen
+        services.log.info("root", station_m=round(fallen, 2), by="chord")
+        return True
+    if estimate.station_m <= NEAREST_ROOT_M:
+        services.memory.root_station_m = estimate.station_m
+        services.log.info("root", station_m=round(estimate.station_m, 2), by="radius")
+        return True
+    return False

@@ -1,0 +1,45 @@
+"""Over to the other side of the blade."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
+
+from mission.behaviours.behaviour import Parameters, behaviour
+
+if TYPE_CHECKING:
+    from mission.executive.services import Services
+
+
+class Reposition(Parameters):
+    """Parameters of `reposition`."""
+
+    side: Literal["leading", "trailing"] = Field("trailing", description="the edge to go to")
+    standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to hold meanwhile")
+    steady_s: float = Field(1.0, gt=0, le=10, description="how long the new edge must be held in view")
+
+
+@behaviour(
+    outcomes={"in_position": "the other edge is in view and tracked"},
+    parameters=Reposition,
+    needs_vision=True,
+)
+async def reposition(services: Services, parameters: Reposition) -> str:
+    """Shift across the blade until the other edge is held in view, never losing both (5.24 to 5.26)."""
+    from mission.behaviours.following import Following
+
+    following = Following(services, side=parameters.side, toward="root", standoff_m=parameters.standoff_m)
+    good_since: float | None = None
+    async for now in services.ticks():
+        steered = following.tick(now)
+        if steered is None:
+            continue
+        estimate, _ = steered
+        side = following.side(estimate)
+        seen = side is not None and side.age_s < 0.6
+        services.progress.text = f"{parameters.side} edge {'in view' if seen else 'not in view yet'}"
+        good_since = (good_since if good_since is not None else now) if seen else None
+        if good_since is not None and now - good_since >= parameters.steady_s:
+            return "in_position"
+    raise AssertionError("ticks never end")

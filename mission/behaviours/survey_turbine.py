@@ -1,0 +1,77 @@
+"""From afar: where the turbine really stands and how its blades are parked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field
+
+from mission.behaviours.behaviour import Parameters, behaviour
+from mission.behaviours.motion import fly_to, wrap
+
+if TYPE_CHECKING:
+    from mission.executive.perception import FarSight
+    from mission.executive.services import Services
+
+
+class SurveyTurbine(Parameters):
+    """Parameters of `survey_turbine`."""
+
+    distance_m: float = Field(45.0, ge=30, le=80, description="in front of the hub")
+    baseline_m: float = Field(24.0, ge=6, le=60, description="between the outermost viewpoints, to the side")
+    views: int = Field(3, ge=2, le=9, description="viewpoints")
+    pictures: int = Field(4, ge=1, le=20, description="pictures at each viewpoint")
+    speed_m_s: float = Field(6.0, gt=0, le=10, description="speed between the viewpoints")
+
+
+@behaviour(
+    outcomes={
+        "found": "hub and blades located",
+        "not_found": "no rotor in the pictures, or they contradict each other",
+    },
+    parameters=SurveyTurbine,
+    needs_vision=True,
+)
+async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
+    """Picture the rotor from several places in front of it, intersect the views, and correct what the survey said."""
+    sights: list[FarSight] = []
+    for place in _viewpoints(services, parameters):
+        sight = services.turbine.hub - place
+        yaw = float(np.arctan2(sight[1], sight[0]))
+        services.progress.text = f"to viewpoint {len(sights) // parameters.pictures + 1} of {parameters.views}"
+        await fly_to(services, place, yaw, speed_m_s=parameters.speed_m_s, tolerance_m=1.0)
+        for _ in range(parameters.pictures):
+            found = await services.perception.far_view()
+            services.log.info("far_view", valid=found.view.valid, reasons=list(found.view.reasons))
+            if found.view.valid:
+                sights.append(found)
+            await services.clock.sleep(0.3)
+    refined = services.locate(sights)
+    if refined is None:
+        services.progress.text = "the pictures do not agree on a rotor"
+        return "not_found"
+    shift = refined.hub - services.turbine.hub
+    services.log.info(
+        "survey",
+        hub=[round(float(v), 2) for v in refined.hub],
+        shift_m=round(float(np.linalg.norm(shift)), 2),
+        azimuth_deg=round(float(np.degrees(refined.azimuth)), 2),
+        azimuth_shift_deg=round(float(np.degrees(wrap(refined.azimuth - services.turbine.azimuth))), 2),
+    )
+    services.refine_turbine(refined)
+    return "found"
+
+
+def _viewpoints(services: Services, parameters: SurveyTurbine) -> list[np.ndarray]:
+    """Places (3,) in local NED on a line across the view, the nearest to the vehicle first."""
+    turbine = services.turbine
+    x, y, _ = turbine.axes()
+    front = turbine.hub - parameters.distance_m * x
+    front[2] = turbine.hub[2]
+    steps = np.linspace(-0.5, 0.5, parameters.views) * parameters.baseline_m
+    places = [front + step * y for step in steps]
+    here = services.autopilot.telemetry.pose.position
+    if np.linalg.norm(places[-1] - here) < np.linalg.norm(places[0] - here):
+        places.reverse()
+    return places
