@@ -48,7 +48,7 @@ class Following:
     def tick(self, now: float) -> tuple[BladeEstimate, FollowCommand] | None:
         """Steer once by the estimate for now; None, and nothing changes, as long as the blade was never seen.
 
-        The older the last image, the slower: bridging a drop-out must not carry the vehicle far along a remembered blade.
+        The older the last image, the slower: bridging a drop-out must not carry the vehicle far along.
         """
         estimate = self._services.perception.estimate()
         if estimate is None:

@@ -85,7 +85,7 @@ class Progress:
 
 @dataclass
 class Memory:
-    """What behaviours have found out and later ones rely on. It is journalled at every transition and comes back on resume."""
+    """What behaviours found out and later ones rely on; journalled at every transition, back on resume."""
 
     home: tuple[float, float, float] | None = None
     hub: tuple[float, float, float] | None = None
@@ -99,7 +99,7 @@ class Memory:
 
 @dataclass
 class Services:
-    """One run's services. `turbine` is what is believed of the turbine, refined by the survey; never the simulated truth."""
+    """One run's services. `turbine` is what is believed of it, refined by the survey; never the simulated truth."""
 
     clock: Clock
     autopilot: Autopilot
@@ -123,8 +123,8 @@ class Services:
         self.on_turbine_refined(turbine)
 
     async def ticks(self, rate_hz: float = 20.0) -> AsyncIterator[float]:
-        """Yield the mission time `rate_hz` times a wall second: the control rate does not fall when time runs faster."""
-        period = self.clock.speed / rate_hz
+        """Yield the mission time `rate_hz` times a mission second, but never more than 50 times a wall second."""
+        period = max(1.0 / rate_hz, self.clock.speed / 50.0)
         while True:
             yield self.clock.now()
             await self.clock.sleep(period)
