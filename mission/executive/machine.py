@@ -1,8 +1,8 @@
 """The mission compiled to the `transitions` library: it holds the active state and walks the hierarchy.
 
-Names, targets and guards have been proven sound before; the library would not notice. History, retries and the chain of
-events that one event falls back to are put into the compiled machine as further guarded transitions, so that the library
-answers exactly as `mission.language.semantics` says. The two are held against each other at every step.
+Names, targets and guards have been proven sound before; the library would not notice. History, retries and the chain
+of events that one event falls back to are compiled into guarded transitions, so that the library answers exactly as
+`mission.language.semantics` says. The two are held against each other at every step.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class Machine:
         return compiled
 
     def _transitions(self) -> Iterator[dict[str, Any]]:
-        """Inner entries stand on their own states; the mission's own `on` on every outermost state, after its entries."""
+        """Inner entries stand on their own states; the mission's own `on` on every outermost state, after its own."""
         outermost = [path for path, state in self.mission.states.items() if state.parent is None]
         for state in self.mission.states.values():
             for transition in state.on:
@@ -114,7 +114,7 @@ class Machine:
                 yield from self._variants(path, transition)
 
     def _variants(self, source: str, transition: Transition) -> Iterator[dict[str, Any]]:
-        """One transition of the library for each leaf in which it may end: one, or with history one per remembered leaf."""
+        """A transition of the library for each leaf in which it may end: one, or with history one per remembered leaf."""
         for leaf in self._ends(transition):
             yield {
                 "trigger": transition.event,
