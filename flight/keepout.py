@@ -1,50 +1,250 @@
-"""The volume that no setpoint may enter: rotor, hub, nacelle and tower, grown by a clearance and by what is not known."""
+"""The volume that no setpoint may enter: rotor, hub, nacelle and tower, grown by a clearance and by what is not known.
+
+The rotor counts as the whole disc that it sweeps: a slab between the coned, tilted faces of the blades. While the eye
+follows the inspected blade, its measured surface replaces the survey's there (`with_blade_surface`), since a survey
+that is off by metres would either forbid a standoff of three metres or allow a collision.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.solids import Ball, Box, Revolved, Solid
 from flight.turbine import Turbine
 from vision.estimate import BladeEstimate
 
 Array = NDArray[np.float64]
 
+MARGIN_M = 1e-3  # bounded points lie this far outside, so that rounding does not put them inside
+TRUST_S = 3.0  # seconds of good measurement until the measured surface has wholly replaced the survey's
+DISTRUST_S = 20.0  # seconds without it until the survey's is back: longer than any bridge, shorter than GPS drift
+TRUSTED_SIGMA_M = 0.3  # a distance less certain than this opens nothing
+TRUSTED_AGE_S = 1.0
+LOCAL_M = 5.0  # the measured surface holds this far along the blade and fades out over as much again
+BEND_PER_M = 0.05  # how much a blade may leave its tangent, metres a metre
+TIP_HALF_DEPTH_M = 0.3  # half of what a twisted tip takes up from front to back
+
+
+@dataclass(frozen=True)
+class BladeSurface:
+    """The measured front of the inspected blade in blade coordinates: depth = depth_m + slope (station − station_m)
+    with its sigma, and how far it has replaced the survey: trust 0 to 1."""
+
+    station_m: float
+    depth_m: float
+    slope: float
+    sigma_m: float
+    trust: float
+
 
 @dataclass(frozen=True)
 class KeepOut:
-    """turbine as believed; clearance_m from any of its surfaces to the vehicle's reference point."""
+    """turbine as believed; clearance_m from any of its surfaces to the vehicle's reference point; sigmas: how many
+    standard deviations of the turbine's position and heading are added."""
 
     turbine: Turbine
     clearance_m: float = 2.0
+    sigmas: float = 1.0
+    surface: BladeSurface | None = None
 
     def distance(self, point: Array) -> float:
         """Metres from a point (3,) of local NED to the volume; negative inside."""
-        raise NotImplementedError
+        return self._probe(np.asarray(point, float))[0]
 
     def inside(self, point: Array) -> bool:
         """Whether a point (3,) of local NED lies in the volume."""
-        raise NotImplementedError
+        return self.distance(point) < 0
 
     def path_clear(self, start: Array, end: Array) -> bool:
-        """Whether the straight way between two points (3,) stays out of the volume."""
-        raise NotImplementedError
+        """Whether the straight way between two points (3,) of local NED stays out of the volume."""
+        return self._way(np.asarray(start, float), np.asarray(end, float), 0.0) is None
 
     def bound(self, position: Array, current: Array) -> tuple[Array, bool]:
-        """The allowed point (3,) nearest to `position` that can be reached straight from `current`, and whether it differs."""
-        raise NotImplementedError
+        """The point to fly to instead of `position` (3,), and whether it differs.
+
+        It is allowed, reached straight from `current` without entering the volume, and as near to `position` as sliding
+        along the volume's surface brings it. A vehicle inside is never held there: it may go anywhere that does not
+        lead deeper, and is otherwise sent out the shortest way, or to the front.
+        """
+        position, current = np.asarray(position, float), np.asarray(current, float)
+        depth = min(0.0, self.distance(current))
+
+        def reachable(point: Array) -> bool:
+            return not self.inside(point) and self._way(current, point, depth) is None
+
+        if reachable(position):
+            return position, False
+        candidates = [self._pushed(position), self._to_the_front(position), self._slid(position, current)]
+        allowed = [point for point in candidates if reachable(point)]
+        if allowed:
+            return min(allowed, key=lambda point: float(np.linalg.norm(point - position))), True
+        if depth < 0:
+            return next(
+                (p for p in (self._pushed(current), self._to_the_front(current)) if reachable(p)),
+                self._to_the_front(current),
+            ), True
+        return self._stopped(position, current), True
 
     def with_turbine(self, turbine: Turbine) -> KeepOut:
-        """The volume around a refined turbine."""
-        raise NotImplementedError
+        """The volume around a refined turbine; what was measured of the blade's surface in the old frame is
+        forgotten."""
+        return replace(self, turbine=turbine, surface=None)
 
     def with_blade_surface(self, estimate: BladeEstimate, elapsed_s: float) -> KeepOut:
-        """The volume with the inspected blade's measured surface in place of the survey's; call it at every control tick
-        with the seconds since the last call."""
-        raise NotImplementedError
+        """The volume with the inspected blade's measured surface, `elapsed_s` after the last call; call it at every
+        tick.
+
+        A blade that is nearer than surveyed counts at once. One that is farther opens the way only as trust grows: over
+        three seconds of certain, recent estimates, so that no single wrong distance moves the vehicle into the blade.
+        Trust fades over twenty seconds without such estimates, and the last surface keeps its place meanwhile.
+        """
+        old = self.surface
+        certain = estimate.age_s <= TRUSTED_AGE_S and estimate.distance_sigma_m <= TRUSTED_SIGMA_M
+        if not certain:
+            if old is None:
+                return self
+            return replace(self, surface=replace(old, trust=max(0.0, old.trust - elapsed_s / DISTRUST_S)))
+        edges = [side.offset_m for side in (estimate.leading, estimate.trailing) if side is not None]
+        at_axis = float(self.turbine.blade_frame().to_blade(estimate.point)[1])
+        front = min([0.0, *(estimate.across_slope * (offset - at_axis) for offset in edges)])
+        trust = min(1.0, (old.trust if old else 0.0) + elapsed_s / TRUST_S)
+        surface = BladeSurface(
+            estimate.station_m, estimate.depth_m + front, estimate.depth_slope, estimate.distance_sigma_m, trust
+        )
+        return replace(self, surface=surface)
 
     def without_blade_surface(self) -> KeepOut:
         """The survey's volume again, as after leaving the blade."""
-        raise NotImplementedError
+        return replace(self, surface=None)
+
+    @cached_property
+    def _solids(self) -> tuple[Solid, ...]:
+        t = self.turbine
+        grown = self.clearance_m + self.sigmas * t.hub_sigma_m
+        x, _, z = t.axes()
+        hub_radius = max(t.root_diameter_m, t.root_radius_m + 0.5)
+        tower_axis = t.hub + t.overhang_m * x
+        height = t.ground_z - t.hub[2]
+        tower = ((0.0, 0.0), (0.0, t.tower_top_diameter_m / 2), (height, t.tower_base_diameter_m / 2), (height, 0.0))
+        nacelle = np.array([t.nacelle_length_m / 2, t.nacelle_width_m / 2, t.nacelle_width_m / 2])
+        return (
+            Revolved(t.hub, t.rotor_rotation[:, 0], self._rotor_profile(), self.clearance_m),
+            Ball(t.hub + self._hub_shift() * x, hub_radius + grown),
+            Revolved(tower_axis, z, tower, grown),
+            Box(t.hub + t.nacelle_length_m / 2 * x, t.rotation, nacelle, grown),
+        )
+
+    def _rotor_profile(self) -> tuple[tuple[float, float], ...]:
+        """The slab's outline as (along the rotor's axis, radius), from the faces in blade coordinates."""
+        t, surface = self.turbine, self.surface
+        tip = t.tip_radius_m + self.sigmas * t.hub_sigma_m
+        stations = {0.0, tip}
+        if surface is not None:
+            near = (-2 * LOCAL_M, -LOCAL_M, 0.0, LOCAL_M, 2 * LOCAL_M)
+            stations |= {s for s in (surface.station_m + offset for offset in near) if 0.0 < s < tip}
+        front, back = [], []
+        for station in sorted(stations):
+            thick, unsure = self._half_depth(station), self._survey_sigma(station)
+            face = self._face(station)
+            front.append((face, station))
+            back.append((max(thick + unsure, face + 2 * thick), station))
+        cos, sin = np.cos(t.cone), np.sin(t.cone)
+        outline = [*front, *reversed(back)]
+        return tuple((float(d * cos - s * sin), float(max(s * cos + d * sin, 0.0))) for d, s in outline)
+
+    def _face(self, station: float) -> float:
+        """Depth of the slab's front at a station, in blade coordinates."""
+        survey = -self._half_depth(station) - self._survey_sigma(station)
+        surface = self.surface
+        if surface is None:
+            return survey
+        away = abs(station - surface.station_m)
+        share = surface.trust * float(np.clip(2.0 - away / LOCAL_M, 0.0, 1.0))
+        unsure = self.sigmas * float(np.hypot(surface.sigma_m, BEND_PER_M * away))
+        measured = surface.depth_m + surface.slope * (station - surface.station_m) - unsure
+        if measured < survey and away <= LOCAL_M:
+            return measured
+        return share * measured + (1.0 - share) * survey
+
+    def _hub_shift(self) -> float:
+        """How far the measured blade, extended to the hub, puts the hub behind the survey; 0 away from the root."""
+        surface = self.surface
+        if surface is None:
+            return 0.0
+        share = surface.trust * float(np.clip(2.0 - surface.station_m / LOCAL_M, 0.0, 1.0))
+        return share * (surface.depth_m - surface.slope * surface.station_m + self._half_depth(surface.station_m))
+
+    def _half_depth(self, station: float) -> float:
+        t = self.turbine
+        share = float(np.clip((station - t.root_radius_m) / (t.tip_radius_m - t.root_radius_m), 0.0, 1.0))
+        return (1 - share) * t.root_diameter_m / 2 + share * TIP_HALF_DEPTH_M
+
+    def _survey_sigma(self, station: float) -> float:
+        t = self.turbine
+        return self.sigmas * float(np.hypot(t.hub_sigma_m, t.heading_sigma * station))
+
+    def _probe(self, point: Array) -> tuple[float, Array]:
+        return min((solid.probe(point) for solid in self._solids), key=lambda probed: probed[0])
+
+    def _way(self, start: Array, end: Array, least: float) -> float | None:
+        """The share of the way at which the distance falls below `least`, or None. Steps are as long as the distance
+        allows; the shortest, 5 cm, cannot cut a corner that is rounded by the clearance by more than a fraction of a
+        millimetre."""
+        length = float(np.linalg.norm(end - start))
+        along = 0.0
+        while along <= length:
+            share = along / length if length else 1.0
+            distance = self.distance(start + share * (end - start)) - least
+            if distance < -1e-6:
+                return share
+            along += max(distance, 0.05)
+        return None
+
+    def _pushed(self, point: Array) -> Array:
+        """The nearest allowed point: along the steepest growth of the distance, again where solids meet."""
+        for _ in range(30):
+            distance, direction = self._probe(point)
+            if distance >= 0:
+                return point
+            point = point + (MARGIN_M - distance) * direction
+        return point
+
+    def _to_the_front(self, point: Array) -> Array:
+        """The first allowed point on the way to the front, along the rotor's axis."""
+        forward = -self.turbine.rotor_rotation[:, 0]
+        for _ in range(1000):
+            distance = self.distance(point)
+            if distance >= 0:
+                return point
+            point = point + max(-distance, 0.02) * forward
+        return point
+
+    def _slid(self, position: Array, current: Array) -> Array:
+        """`position` moved onto the tangent plane of the surface where the way meets it, again until the way is
+        clear."""
+        for _ in range(8):
+            share = self._way(current, position, 0.0)
+            if share is None:
+                break
+            met = current + share * (position - current)
+            distance, direction = self._probe(met)
+            met = met + (MARGIN_M - distance) * direction
+            position = position + max(0.0, float((met - position) @ direction)) * direction
+        return position
+
+    def _stopped(self, position: Array, current: Array) -> Array:
+        """The last point of the straight way before it enters the volume."""
+        share = self._way(current, position, 0.0)
+        if share is None:
+            return current
+        length = float(np.linalg.norm(position - current))
+        while share > 0:
+            point = current + share * (position - current)
+            if not self.inside(point):
+                return point
+            share -= 0.05 / length
+        return current

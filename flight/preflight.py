@@ -1,4 +1,5 @@
-"""Is this vehicle fit to fly beside a turbine: health, battery, position, and the failsafe parameters that would hurt."""
+"""Is this vehicle fit to fly beside a turbine: health, battery, position, and the failsafe parameters that would
+hurt."""
 
 from __future__ import annotations
 
@@ -21,6 +22,6 @@ class Finding:
 async def check(
     autopilot: Autopilot, *, battery_percent: float, speed: float = 1.0, gimbal: bool = True
 ) -> list[Finding]:
-    """Findings in a fixed order; the vehicle is fit where none refuses. `battery_percent` is the least to start with, `speed`
-    the simulation's factor, by which PX4's start script has multiplied its time-outs."""
+    """Findings in a fixed order; the vehicle is fit where none refuses. `battery_percent` is the least to start with,
+    `speed` the simulation's factor, by which PX4's start script has multiplied its time-outs."""
     raise NotImplementedError

@@ -1,5 +1,5 @@
-"""The stream of setpoints: at least twenty a wall second, bounded by the keep-out volume, and only while the executive is
-provably alive."""
+"""The stream of setpoints: at least twenty a wall second, bounded by the keep-out volume, and only while the executive
+is provably alive."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ Turbine axes W are level: x from the front through the hub to the back, y right 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Turbine:
-    """hub (3,) m in local NED with its standard deviation per axis; heading rad, the direction from front to back; azimuth
-    rad of the inspected blade, clockwise from up as seen from the front. Radii are from the hub's centre, `ground_z` is the
-    tower's foot in local NED (down, so negative above the origin), lengths in metres, angles in radians.
+    """hub (3,) m in local NED with its standard deviation per axis; heading rad, the direction from front to back;
+    azimuth rad of the inspected blade, clockwise from up as seen from the front. Radii are from the hub's centre,
+    `ground_z` is the tower's foot in local NED (down, so negative above the origin), lengths in metres, angles in
+    radians.
     """
 
     hub: Array
@@ -61,8 +63,8 @@ class Turbine:
     ) -> Turbine:
         """From a site (tower's axis north and east of home, ground above home) and a turbine's dimensions.
 
-        The hub's centre is `overhang_m` in front of the tower's axis, `hub_height_m` above the ground. `rest` are further
-        fields by their names; lengths in metres, angles in radians.
+        The hub's centre is `overhang_m` in front of the tower's axis, `hub_height_m` above the ground. `rest` are
+        further fields by their names; lengths in metres, angles in radians.
         """
         front = -overhang_m * np.array([np.cos(heading), np.sin(heading), 0.0])
         return cls(
@@ -141,4 +143,5 @@ class Turbine:
             "heading_sigma": heading_sigma,
             "azimuth_sigma": azimuth_sigma,
         }
-        return replace(self, **{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+        known: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        return replace(self, **known)
