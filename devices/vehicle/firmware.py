@@ -1,0 +1,375 @@
+"""The autopilot's judgement: arming gate, flight modes, take-off and landing, failsafes. Commands come in here and
+nowhere else, whether they came over MAVLink or in process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Any
+
+from devices.vehicle.battery import Battery
+from devices.vehicle.body import Body
+from devices.vehicle.control import Controller, Target
+from devices.vehicle.estimator import VALID_AFTER_S, Estimator
+from devices.vehicle.gimbal import Gimbal
+from devices.vehicle.modes import Flight, Flying, Hold, Land, Mode, Offboard, Piloted, ReturnHome, Sticks, TakeOff
+from devices.vehicle.parameters import ParameterTable
+
+_LANDED_AFTER_S = 2.0
+_OFFBOARD_BACK_S = 0.04
+_BATTERY_HOLD_S = 5.0
+_GCS_GRACE_S = 2.0
+_IDLE_THRUST = 1.5
+
+
+class Result(IntEnum):
+    """MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+
+
+class Severity(IntEnum):
+    """MAV_SEVERITY, those that are used."""
+
+    CRITICAL = 2
+    WARNING = 4
+    INFO = 6
+
+
+class Firmware:
+    """Decides what flies. `mode` is what flies now, `intended` what was last asked for, `failsafe` why they differ.
+
+    `tick` is called every control cycle and returns the target, or None for motors that idle or stand still.
+    `note(kind, **data)` records events; `say(severity, text)` is what a ground station reads.
+    """
+
+    def __init__(
+        self,
+        parameters: ParameterTable,
+        body: Body,
+        estimate: Estimator,
+        controller: Controller,
+        battery: Battery,
+        gimbal: Gimbal,
+        note: Callable[..., None],
+        say: Callable[[Severity, str], None],
+    ) -> None:
+        self.parameters = parameters
+        self._body, self._estimate, self._controller = body, estimate, controller
+        self._battery, self._gimbal = battery, gimbal
+        self._note, self._say = note, say
+        self.flight = Flight(estimate, parameters, Sticks(), Target())
+        self.time_s = 0.0
+        self.armed = False
+        self.landed = True
+        self.taking_off = False
+        self.mode = self.intended = Mode.HOLD
+        self.failsafe: str | None = None
+        self.terminated = False
+        self.setpoint_s: float | None = None
+        self.pilot_s: float | None = None
+        self.gcs_s: float | None = None
+        self._gcs_lost = False
+        self._flying: Flying = Hold(estimate)
+        self._armed_s = self._landed_s = self._contact_s = 0.0
+        self._back_s: float | None = None
+        self._before_landing = Mode.HOLD
+        self._take_off_down: float | None = None
+        self._battery_stage = 0
+        self._battery_act_s = 0.0
+        self._resets = 0
+
+    # Commands
+
+    def arm(self, force: bool = False) -> Result:
+        """Start the motors; refused until the estimate is good and the mode can be flown."""
+        if self.armed:
+            return Result.ACCEPTED
+        reason = None if force else self.not_armable
+        if reason is not None:
+            self._say(Severity.CRITICAL, f"Arming denied: {reason}")
+            self._note("arming_denied", reason=reason)
+            return Result.TEMPORARILY_REJECTED
+        self.armed, self.landed, self.terminated = True, True, False
+        self._armed_s, self._landed_s = self.time_s, self.time_s
+        estimate = self._estimate
+        self.flight.home = (estimate.n, estimate.e, estimate.d)
+        self._controller.reset(estimate)
+        self._enter(self.mode)
+        self._note("armed")
+        self._say(Severity.INFO, "Armed by external command")
+        return Result.ACCEPTED
+
+    def disarm(self, force: bool = False) -> Result:
+        """Stop the motors; refused in the air unless forced."""
+        if self.armed and not self.landed and not force:
+            self._say(Severity.CRITICAL, "Disarming denied: not landed")
+            return Result.TEMPORARILY_REJECTED
+        if self.armed:
+            self._disarm("command")
+        return Result.ACCEPTED
+
+    def set_mode(self, mode: Mode) -> Result:
+        """Ask for a flight mode, as a companion or a ground station does."""
+        reason = self._not_flyable(mode) if self.armed else None
+        if reason is not None:
+            self._say(Severity.WARNING, f"Switching to {mode.name} is currently not available: {reason}")
+            self._note("mode_refused", mode=mode.name, reason=reason)
+            return Result.TEMPORARILY_REJECTED
+        self._intend(mode)
+        return Result.ACCEPTED
+
+    def take_off(self, down_m: float | None = None) -> Result:
+        """TAKEOFF mode toward a local height (NED down), or to MIS_TAKEOFF_ALT above home."""
+        self._take_off_down = down_m
+        return self.set_mode(Mode.TAKEOFF)
+
+    def reposition(self, north_m: float, east_m: float, down_m: float, yaw: float) -> Result:
+        """Hold, but over there. NaN keeps what is."""
+        result = self.set_mode(Mode.HOLD)
+        if result is Result.ACCEPTED and isinstance(self._flying, Hold):
+            hold = self._flying
+            hold.n, hold.e = (north_m if north_m == north_m else hold.n), (east_m if east_m == east_m else hold.e)
+            hold.d, hold.yaw = (down_m if down_m == down_m else hold.d), yaw
+        return result
+
+    def offboard_setpoint(self, setpoint: Target) -> None:
+        """A setpoint from the companion computer, now."""
+        limits = self.parameters
+        setpoint.speed_max = float(limits["MPC_XY_VEL_MAX"])
+        setpoint.climb_max = float(limits["MPC_Z_VEL_MAX_UP"])
+        setpoint.sink_max = float(limits["MPC_Z_VEL_MAX_DN"])
+        self.flight.setpoint = setpoint
+        self.setpoint_s = self.time_s
+
+    def pilot(self, sticks: Sticks) -> None:
+        """Sticks of a remote control; a firm push takes over from an automatic mode as COM_RC_OVERRIDE says."""
+        self.flight.sticks = sticks
+        self.pilot_s = self.time_s
+        override = int(self.parameters["COM_RC_OVERRIDE"])
+        allowed = (self.mode.automatic and override & 1) or (self.mode is Mode.OFFBOARD and override & 2)
+        if allowed and not self.landed and max(abs(sticks.pitch), abs(sticks.roll)) > 0.5:
+            self.pilot_takes_over(Mode.POSCTL)
+
+    def pilot_takes_over(self, mode: Mode) -> None:
+        """The pilot flips the mode switch of the remote control: always obeyed."""
+        self.pilot_s = self.time_s
+        self._note("pilot", mode=mode.name)
+        self._intend(mode)
+
+    def gcs_heartbeat(self) -> None:
+        """A ground station was heard."""
+        if self._gcs_lost:
+            self._gcs_lost = False
+            self._note("datalink_regained")
+        self.gcs_s = self.time_s
+
+    # State
+
+    @property
+    def has_pilot(self) -> bool:
+        """Whether a remote control is there (once taken over, it stays)."""
+        return self.pilot_s is not None
+
+    @property
+    def offboard_fresh(self) -> bool:
+        """Whether the last setpoint is younger than COM_OF_LOSS_T."""
+        limit = float(self.parameters["COM_OF_LOSS_T"])
+        return self.setpoint_s is not None and self.time_s - self.setpoint_s <= limit
+
+    @property
+    def not_armable(self) -> str | None:
+        """Why it would refuse to arm, None when it would not."""
+        if self.time_s < VALID_AFTER_S:
+            return "no valid position estimate yet"
+        if self._battery.percent < 100 * float(self.parameters["BAT_CRIT_THR"]):
+            return "battery critical"
+        if self.mode in (Mode.LAND, Mode.RTL):
+            return "mode not suitable for take-off"
+        return self._not_flyable(self.intended)
+
+    def _not_flyable(self, mode: Mode) -> str | None:
+        if mode is Mode.OFFBOARD and not self.offboard_fresh:
+            return "no offboard signal"
+        if mode.piloted and not self.has_pilot:
+            return "no manual control"
+        if mode is Mode.MISSION:
+            return "no mission"
+        if mode.automatic and self.time_s < VALID_AFTER_S:
+            return "no valid position estimate yet"
+        return None
+
+    # Every control cycle
+
+    def tick(self, seconds: float) -> Target | None:
+        """One control cycle: failsafes, mode, target."""
+        self.time_s += seconds
+        if self._estimate.resets != self._resets:
+            self._resets = self._estimate.resets
+            self._flying.shift(*self._estimate.last_jump)
+        self._watch_datalink()
+        if not self.armed:
+            self._body.thrust_command = 0.0
+            return None
+        self._watch_offboard()
+        self._watch_battery()
+        target = self._flying.target(self.flight, seconds)
+        if self._flying.done:
+            self._enter_next()
+        if self._watch_ground(target, seconds):
+            self._body.thrust_command = 0.0 if not self.armed else _IDLE_THRUST
+            return None
+        return target
+
+    def _watch_offboard(self) -> None:
+        if self.intended is not Mode.OFFBOARD:
+            return
+        if self.failsafe == "offboard_lost":
+            if self.offboard_fresh:
+                self._back_s = self._back_s if self._back_s is not None else self.time_s
+                if self.time_s - self._back_s >= _OFFBOARD_BACK_S:
+                    self._leave_failsafe()
+            else:
+                self._back_s = None
+        elif self.failsafe is None and not self.offboard_fresh:
+            action = int(self.parameters["COM_OBL_RC_ACT"])
+            if action == 7:
+                self._note("failsafe", reason="offboard_lost", action="DISARM", setpoint_s=self.setpoint_s)
+                self._disarm("offboard_lost")
+                return
+            modes = {4: Mode.LAND, 5: Mode.HOLD}
+            if self.has_pilot:
+                modes |= {0: Mode.POSCTL, 1: Mode.ALTCTL, 2: Mode.MANUAL}
+            self._fail("offboard_lost", modes.get(action, Mode.RTL))
+            self._back_s = None
+
+    def _watch_battery(self) -> None:
+        left, p = self._battery.percent / 100, self.parameters
+        action = int(p["COM_LOW_BAT_ACT"])
+        if self._battery_stage == 0 and left < float(p["BAT_LOW_THR"]):
+            self._battery_stage = 1
+            self._note("battery_low", percent=self._battery.percent)
+            self._say(Severity.WARNING, "Low battery level")
+        if self._battery_stage == 1 and left < float(p["BAT_CRIT_THR"]):
+            self._battery_stage = 2
+            self._say(Severity.CRITICAL, "Critical battery level! Return now")
+            if action in (2, 3) and not self.mode.piloted and self.mode not in (Mode.LAND, Mode.RTL):
+                self._fail("battery_critical", Mode.HOLD)
+                self._battery_act_s = self.time_s + _BATTERY_HOLD_S
+        if self.failsafe == "battery_critical" and self.mode is Mode.HOLD and self.time_s >= self._battery_act_s:
+            self._fail("battery_critical", Mode.LAND)
+        if self._battery_stage == 2 and left < float(p["BAT_EMERGEN_THR"]):
+            self._battery_stage = 3
+            self._say(Severity.CRITICAL, "Emergency battery level! Land immediately")
+            if action in (2, 3) and not self.mode.piloted and self.mode is not Mode.LAND:
+                self._fail("battery_emergency", Mode.LAND)
+
+    def _watch_datalink(self) -> None:
+        if self.gcs_s is None or self._gcs_lost:
+            return
+        limit = float(self.parameters["COM_DL_LOSS_T"])
+        if self.time_s - self.gcs_s < limit * (1 + _GCS_GRACE_S / 10):
+            return
+        self._gcs_lost = True
+        self._note("datalink_lost")
+        self._say(Severity.WARNING, "Connection to ground station lost")
+        modes = {1: Mode.HOLD, 2: Mode.RTL, 3: Mode.LAND}
+        action = modes.get(int(self.parameters["NAV_DLL_ACT"]))
+        if action is not None and self.armed and not self.mode.piloted and self.failsafe is None:
+            self._fail("datalink_lost", action)
+
+    def _watch_ground(self, target: Target, seconds: float) -> bool:
+        """Landed detection; True while the vehicle rests on the ground with idle motors."""
+        body = self._body
+        upward = target.vd < -0.05 or (target.d == target.d and target.d < self._estimate.d - 0.2)
+        if self.landed:
+            spooled = self.time_s - self._armed_s >= float(self.parameters["COM_SPOOLUP_TIME"])
+            if upward and spooled and self.mode not in (Mode.HOLD, Mode.LAND, Mode.RTL):
+                self.landed, self.taking_off = False, True
+                self._contact_s = 0.0
+                self._note("takeoff")
+                return False
+            since = self.time_s - self._landed_s
+            wait = "COM_DISARM_PRFLT" if self._landed_s == self._armed_s else "COM_DISARM_LAND"
+            if since >= float(self.parameters[wait]) > 0:
+                self._disarm("auto")
+            return True
+        self.taking_off = self.mode is Mode.TAKEOFF
+        self._contact_s = self._contact_s + seconds if body.on_ground and not upward else 0.0
+        if self._contact_s >= _LANDED_AFTER_S:
+            self.landed, self.taking_off = True, False
+            self._landed_s = self.time_s
+            self._note("landed", impact_m_s=round(body.impact_m_s, 3))
+            self._say(Severity.INFO, "Landing detected")
+            self._gimbal.release()
+            return True
+        return False
+
+    # Mode changes
+
+    def _intend(self, mode: Mode) -> None:
+        if mode in (Mode.LAND, Mode.RTL) and self.intended not in (Mode.LAND, Mode.RTL):
+            self._before_landing = Mode.HOLD if self.intended is Mode.TAKEOFF else self.intended
+        self.intended = mode
+        if self.failsafe is not None:
+            self._note("failsafe_ended", reason=self.failsafe)
+            self.failsafe = None
+        self._enter(mode)
+
+    def _fail(self, reason: str, mode: Mode) -> None:
+        self.failsafe = reason
+        self._note("failsafe", reason=reason, action=mode.name, setpoint_s=self.setpoint_s)
+        self._say(Severity.CRITICAL, f"Failsafe activated: {reason.replace('_', ' ')}, {mode.name}")
+        self._enter(mode)
+
+    def _leave_failsafe(self) -> None:
+        self._note("failsafe_ended", reason=self.failsafe)
+        self.failsafe = None
+        self._enter(self.intended)
+
+    def _enter_next(self) -> None:
+        if self.mode is Mode.TAKEOFF:
+            self._intend(Mode.HOLD)
+        elif self.mode is Mode.RTL and not isinstance(self._flying, Land):
+            self._flying = Land(self._estimate)
+
+    def _enter(self, mode: Mode) -> None:
+        if mode is not self.mode:
+            self._note("mode", mode=mode.name, before=self.mode.name, failsafe=self.failsafe)
+        self.mode = mode
+        estimate = self._estimate
+        if mode is Mode.TAKEOFF:
+            down = self._take_off_down
+            if down is None:
+                down = self.flight.home[2] - float(self.parameters["MIS_TAKEOFF_ALT"])
+            self._flying = TakeOff(estimate, down if self.landed else min(down, estimate.d))
+        elif mode is Mode.LAND:
+            self._flying = Land(estimate)
+        elif mode is Mode.RTL:
+            self._flying = ReturnHome(self.flight)
+        elif mode is Mode.OFFBOARD:
+            self._flying = Offboard(estimate)
+        elif mode.piloted:
+            self._flying = Piloted(estimate, holds_place=mode is Mode.POSCTL)
+        else:
+            self._flying = Hold(estimate)
+
+    def _disarm(self, by: str) -> None:
+        self.armed = False
+        self._body.thrust_command = 0.0
+        if self.mode in (Mode.LAND, Mode.RTL) or self.failsafe is not None:
+            restored = self.intended if self.intended not in (Mode.LAND, Mode.RTL) else self._before_landing
+            self.failsafe = None
+            self.intended = restored
+            self._enter(restored)
+        self._battery_stage = 0
+        self._note("disarmed", by=by)
+        self._say(Severity.INFO, f"Disarmed by {by}")
+
+    def describe(self) -> dict[str, Any]:
+        """What a log line wants to know."""
+        return {"mode": self.mode.name, "armed": self.armed, "landed": self.landed, "failsafe": self.failsafe}
