@@ -26,7 +26,7 @@ _OPERATORS: Mapping[str, Callable[[float, float], bool]] = {
     "==": operator.eq,
     "!=": operator.ne,
 }
-_TOKEN = re.compile(r"\s*(?:(?P<number>[-+]?\d+(?:\.\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<sign><=|>=|==|!=|<|>|\(|\)))")
+_TOKEN = re.compile(r"\s*(?:(?P<number>[-+]?\d+(?:\.\d+)?)|(?P<name>[A-Za-z_][\w.]*)|(?P<sign><=|>=|==|!=|<|>|\(|\)))")
 _LONGEST = 400
 _DEEPEST = 20
 
@@ -57,14 +57,14 @@ class Condition:
         return self.text
 
 
-def parse(text: str) -> Condition:
-    """Read a guard.
+def parse(text: str, vocabulary: Mapping[str, Quantity] = QUANTITIES) -> Condition:
+    """Read a guard, or another statement over a vocabulary of its own.
 
     Raises:
         ConditionError: it breaks the grammar, uses a name outside the vocabulary, or compares with a value that the
             quantity can never pass.
     """
-    return _Parser(text).parse()
+    return _Parser(text, vocabulary).parse()
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,11 @@ class _Token:
 
 
 class _Parser:
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, vocabulary: Mapping[str, Quantity]) -> None:
         if len(text) > _LONGEST:
             raise ConditionError(f"a condition may have {_LONGEST} characters at most", 0)
         self.text = text
+        self.vocabulary = vocabulary
         self.tokens = list(_tokens(text))
         self.position = 0
         self.depth = 0
@@ -141,10 +142,10 @@ class _Parser:
             wanted = "the name of a quantity or condition is expected"
             raise ConditionError(f"{wanted}, not {token.text!r}" if token.text else f"{wanted} here", token.column)
         self.position += 1
-        quantity = QUANTITIES.get(token.text)
+        quantity = self.vocabulary.get(token.text)
         if quantity is None:
             raise ConditionError(
-                f"{token.text!r} is not a quantity or condition", token.column, token.text, tuple(QUANTITIES)
+                f"{token.text!r} is not a quantity or condition", token.column, token.text, tuple(self.vocabulary)
             )
         key = self.argument(quantity, token)
         self.names.append(key)
@@ -157,12 +158,12 @@ class _Parser:
     def argument(self, quantity: Quantity, token: _Token) -> str:
         if not self.accept("("):
             if quantity.arguments:
-                wanted = " or ".join(f"{quantity.name}({argument})" for argument in quantity.arguments)
+                wanted = " or ".join(f"{quantity.name}({argument})" for argument in quantity.arguments[:3])
                 raise ConditionError(f"{quantity.name} needs to be told of what: {wanted}", token.column)
             return quantity.name
         inner = self.next
         if inner.text not in quantity.arguments:
-            known = ", ".join(quantity.arguments) or "nothing"
+            known = ", ".join(quantity.arguments[:6]) or "nothing"
             raise ConditionError(
                 f"{quantity.name}(…) may be asked for {known}, not {inner.text!r}",
                 inner.column,
