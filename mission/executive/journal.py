@@ -32,9 +32,9 @@ class Entry:
 class Journal:
     """Appends lines, flushed and synchronised to the disk.
 
-    `threaded` writes beside the event loop, so that a slow disk never delays a setpoint; without it (lockstep time) each
-    line is written at once. A disk that fails in flight is reported once through `on_lost` and never raised: from then
-    on lines are only counted, in `lost`. Times are rounded to 1 ms; nothing in a line depends on the machine.
+    `threaded` writes beside the event loop, so that a slow disk never delays a setpoint; without it (lockstep time)
+    each line is written at once. A disk that fails in flight is reported once through `on_lost` and never raised: from
+    then on lines are only counted, in `lost`. Times are rounded to 1 ms; nothing in a line depends on the machine.
     """
 
     def __init__(self, path: Path | None, *, threaded: bool = False, seq: int = 0, sync: bool = True) -> None:

@@ -8,6 +8,7 @@ of events that one event falls back to are compiled into guarded transitions, so
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,23 +19,41 @@ from mission.language import semantics
 from mission.language.document import Mission, Transition, enclosing
 from mission.language.semantics import Configuration, Quantities, Step
 
+_ENTRY = 1000  # from this index on a transition is the operator's, and only taken when it is named
+
 
 class MachineError(RuntimeError):
     """The library and the rules of the language disagree: an error of this program, never of a mission."""
 
 
-class _State(NestedAsyncState):  # type: ignore[misc]
+class _State(NestedAsyncState):
     separator = "."
 
 
-class _Library(HierarchicalAsyncMachine):  # type: ignore[misc]
+class _Library(HierarchicalAsyncMachine):
     state_cls = _State
+
+
+@dataclass
+class _Attempt:
+    """An event on its way through the library: what its guards look at, and which transition answered."""
+
+    quantities: Quantities
+    origin: str | None = None
+    only: Transition | None = None
+    taken: Transition | None = None
 
 
 class _Position:
     """The library's model: it keeps `state`, the path of the active leaf."""
 
     state: str
+
+
+def entries(mission: Mission) -> dict[str, Transition]:
+    """The states that the mission marks as an entry, with the transition by which an operator may skip to them."""
+    marked = [path for path, state in mission.states.items() if state.entry]
+    return {path: Transition("skip", path, index=_ENTRY + number) for number, path in enumerate(marked)}
 
 
 class Machine:
@@ -45,10 +64,7 @@ class Machine:
         self.mission = mission
         self.configuration = configuration or semantics.start(mission)
         self._position = _Position()
-        self._quantities: Quantities = {}
-        self._origin: str | None = None
-        self._only: Transition | None = None
-        self._taken: Transition | None = None
+        self._attempt = _Attempt({})
         self._library = _Library(
             model=self._position,
             states=[self._compiled(path) for path, state in mission.states.items() if state.parent is None],
@@ -80,14 +96,13 @@ class Machine:
             MachineError: the library ended elsewhere than the rules say.
         """
         before = self.configuration
-        self._quantities, self._origin, self._only, self._taken = quantities, origin, only, None
+        attempt = self._attempt = _Attempt(quantities, origin, only)
         for name in fallbacks(event):
             if name in self._library.events and await self._position.trigger(name):  # type: ignore[attr-defined]
                 break
-        transition = self._taken
-        if transition is None:
+        if attempt.taken is None:
             return None
-        step = semantics.take(self.mission, before, transition, event)
+        step = semantics.take(self.mission, before, attempt.taken, event)
         if self.state != step.after.leaf:
             raise MachineError(
                 f"{event} in {before.leaf}: the machine went to {self.state}, the rules say {step.after.leaf}"
@@ -110,11 +125,11 @@ class Machine:
             for transition in state.on:
                 yield from self._variants(state.path, transition)
         for path in outermost:
-            for transition in self.mission.on:
+            for transition in (*self.mission.on, *entries(self.mission).values()):
                 yield from self._variants(path, transition)
 
     def _variants(self, source: str, transition: Transition) -> Iterator[dict[str, Any]]:
-        """A transition of the library for each leaf in which it may end: one, or with history one per remembered leaf."""
+        """A transition of the library for each leaf in which it may end: one, or with history each remembered one."""
         for leaf in self._ends(transition):
             yield {
                 "trigger": transition.event,
@@ -136,15 +151,18 @@ class Machine:
         return (first, *sorted(others - {first}))
 
     def _may(self, source: str, transition: Transition, leaf: str, event_data: Any) -> bool:
-        if self._taken is not None or (self._only is not None and transition.key != self._only.key):
+        attempt = self._attempt
+        if attempt.taken is not None or (attempt.only is not None and transition.key != attempt.only.key):
             return False
-        if self._origin is not None and source not in enclosing(self._origin):
+        if transition.event == "skip" and attempt.only is None and transition.index >= _ENTRY:
+            return False
+        if attempt.origin is not None and source not in enclosing(attempt.origin):
             return False
         if semantics.used_up(transition, self.configuration):
             return False
-        if not semantics.guards_hold(transition, self._quantities):
+        if not semantics.guards_hold(transition, attempt.quantities):
             return False
         return semantics.entered_leaf(self.mission, self.configuration, transition) == leaf
 
     def _take(self, transition: Transition, event_data: Any) -> None:
-        self._taken = transition
+        self._attempt.taken = transition

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from vision.estimate import BladeEstimate
     from vision.observation import BladeObservation
 
+T = TypeVar("T")
 FRESH_S = 0.6  # older measurements say nothing of what is near now
 
 
@@ -25,9 +26,9 @@ class Snapshot:
 
     needs_vision: the running behaviour cannot work without images. streaming: setpoints are being sent. vision_age_s:
     since the last accepted observation, or since the watch began; None while nobody watches. seen: something has been
-    accepted since then. standoff_m: the distance to the blade that the running behaviour keeps. was_ours: since take-off
-    the autopilot has flown in a mode that no pilot chose. laser_fault: the rig's own complaint. home: where the flight
-    began, local NED. side: whose frames are being recorded.
+    accepted since then. standoff_m: the distance to the blade that the running behaviour keeps. was_ours: since
+    take-off the autopilot has flown in a mode that no pilot chose. laser_fault: the rig's own complaint. home: where the
+    flight began, local NED. side: whose frames are being recorded.
     """
 
     now: float
@@ -144,5 +145,5 @@ def quantities(snapshot: Snapshot, memory: Memory, *, simulated: bool) -> Mappin
     return {name: _known(value) for name, value in values.items()}
 
 
-def _known(value: Any) -> Any:
+def _known(value: T) -> T | None:
     return None if isinstance(value, float) and not np.isfinite(value) else value

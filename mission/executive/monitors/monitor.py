@@ -21,7 +21,7 @@ Excess = Callable[[Snapshot], float | None]
 class Monitor:
     """One line of the table.
 
-    excess: how far the limit is exceeded: positive when it is, None where that cannot be told (it then changes nothing).
+    excess: how far the limit is exceeded: positive when it is, None where that cannot be told (it changes nothing).
     event: raised once when it has been exceeded for `persist_s` without a break. rearm: how far the excess must fall
     below zero before the event may be raised again. restored: the event raised then. limit: the field of `limits:` that
     it watches. airborne: watched in the air alone.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from mission.executive.monitors.monitor import monitor
 from mission.executive.snapshot import Snapshot
 
-
 FIRST_SIGHT_S = 30.0  # how long a behaviour may look for a blade that it has not seen yet
 
 
