@@ -1,8 +1,8 @@
 """The `mission` program: one module beside this one per command, imported only when that command is used.
 
-A command is a module whose name is also a function in it (with a trailing underscore where Python has taken the word, as in
-`list_`). The first line of the module's docstring is what `mission --help` says of it; the function's own docstring is
-its help, and its typed parameters are its options. Adding a file is enough.
+A command is a module whose name is also a function in it (with a trailing underscore where Python has taken the word,
+as in `list_`). The first line of the module's docstring is what `mission --help` says of it; the function's docstring
+is its help, and its typed parameters are its options. Adding a file is enough.
 """
 
 from __future__ import annotations
@@ -61,7 +61,9 @@ def load(name: str) -> TyperCommand:
     function: Callable[..., Any] = getattr(module, stem, None) or getattr(module, f"{stem}_")
     settings = getattr(function, "context_settings", {})
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command(name, context_settings={"help_option_names": ["-h", "--help"], **settings})(function)
+    app.command(name, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110, **settings})(
+        function
+    )
     command = typer.main.get_command(app)
     assert isinstance(command, TyperCommand)
     return command

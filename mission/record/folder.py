@@ -102,7 +102,7 @@ def create(logs: Path, mission: str, resolved_yaml: str, needed_mb: int = NEEDED
         if isinstance(error, RunFolderError):
             raise
         raise RunFolderError(
-            f"{error.filename or logs}: cannot write the run's folder ({_reason(error)}): choose another with --record DIR"
+            f"{error.filename or logs}: cannot write the record, {_reason(error)}: choose another with --record DIR"
         ) from error
     return folder
 

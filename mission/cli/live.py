@@ -1,0 +1,226 @@
+"""What a person sees of a flight while it lasts: a live panel in a terminal, plain lines everywhere else."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Protocol
+
+from mission.record.follower import JournalFollower
+from mission.cli.scene import Scene, VisionRate, take_scene
+
+if TYPE_CHECKING:
+    from mission.executive.executive import Executive
+    from mission.language.document import Mission
+    from mission.record.folder import RunFolder
+
+REFRESH_S = 0.25
+QUIET_S = 10.0
+"""Without news a plain view says every so often that the flight goes on."""
+
+KEYS = {"p": "paused", "r": "resumed", "s": "step", "a": "abort"}
+
+
+class View(Protocol):
+    """A view of one flight. `start` is called on the executive's loop and returns at once."""
+
+    def start(self, executive: Executive) -> None:
+        """Begin to show this executive."""
+        ...
+
+    def ask(self, question: str) -> bool:
+        """Ask the operator; blocks the calling thread until there is an answer. No terminal means no."""
+        ...
+
+    def close(self) -> None:
+        """Stop and give the terminal back; idempotent."""
+        ...
+
+
+def open_view(mission: Mission, folder: RunFolder, *, headless: bool) -> View:
+    """The view for where this program runs."""
+    return PlainView(mission, folder) if headless else LiveView(mission, folder)
+
+
+class _Watcher:
+    """A thread that looks at the executive a few times a second until told to stop."""
+
+    def __init__(self, mission: Mission, folder: RunFolder) -> None:
+        self._mission, self._folder = mission, folder
+        self._journal = JournalFollower(folder.journal)
+        self._rate = VisionRate()
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self, executive: Executive) -> None:
+        self._thread = threading.Thread(target=self._watch, args=(executive,), name="view", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._stop.set()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(2.0)
+            self._thread = None
+
+    def _watch(self, executive: Executive) -> None:
+        raise NotImplementedError
+
+    def _scene(self, executive: Executive) -> Scene | None:
+        """The present scene; None while the flight is being put together or taken apart."""
+        try:
+            return take_scene(executive, self._rate)
+        except Exception:
+            return None
+
+
+class PlainView(_Watcher):
+    """Timestamped lines: each transition as the journal has it, and where the flight is every ten seconds."""
+
+    def start(self, executive: Executive) -> None:
+        print(f"{self._mission.name}: record in {self._folder.path}", flush=True)
+        super().start(executive)
+
+    def ask(self, question: str) -> bool:
+        if not (sys.stdin.isatty() and sys.stdout.isatty()):
+            return False
+        return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+
+    def close(self) -> None:
+        super().close()
+        self._print_news()
+
+    def _watch(self, executive: Executive) -> None:
+        said = time.monotonic()
+        while not self._stop.wait(REFRESH_S):
+            if self._print_news():
+                said = time.monotonic()
+            elif time.monotonic() - said >= QUIET_S:
+                said = time.monotonic()
+                scene = self._scene(executive)
+                if scene is not None:
+                    print(f"{scene.now_s:8.1f}  {where(scene)}", flush=True)
+
+    def _print_news(self) -> bool:
+        lines = list(self._journal.news())
+        for at, text in lines:
+            print(f"{at:8.1f}  {text}", flush=True)
+        return bool(lines)
+
+
+def where(scene: Scene) -> str:
+    """A scene in one line."""
+    parts = [scene.state]
+    if scene.doing:
+        parts.append(scene.doing)
+    if scene.station_m is not None:
+        parts.append(f"{scene.station_m:.1f} m of {scene.tip_m:.1f} m")
+    if scene.distance_m is not None:
+        parts.append(f"{scene.distance_m:.2f} ± {scene.sigma_m or 0.0:.2f} m away")
+    if scene.vision_age_s is not None:
+        parts.append(f"seen {scene.vision_age_s:.1f} s ago")
+    if scene.battery_percent is not None and scene.battery_percent == scene.battery_percent:
+        parts.append(f"battery {scene.battery_percent:.0f} %")
+    return " · ".join(parts)
+
+
+class LiveView(_Watcher):
+    """A panel redrawn four times a second, and keys for the operator."""
+
+    def __init__(self, mission: Mission, folder: RunFolder) -> None:
+        super().__init__(mission, folder)
+        self._events: list[tuple[float, str]] = []
+        self._question: str | None = None
+        self._answer: Callable[[bool], None] = lambda yes: None
+        self._asking = threading.Lock()
+
+    def ask(self, question: str) -> bool:
+        if self._thread is None:
+            return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+        with self._asking:
+            answered = threading.Event()
+            answers: list[bool] = []
+
+            def answer(yes: bool) -> None:
+                answers.append(yes)
+                answered.set()
+
+            self._answer, self._question = answer, question
+            while not answered.wait(0.1):
+                if self._stop.is_set():
+                    return False
+            return answers[0]
+
+    def _watch(self, executive: Executive) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        from mission.cli.panel import draw
+
+        console = Console()
+        with _keys() as pressed, Live(console=console, auto_refresh=False, transient=True) as live:
+            while not self._stop.is_set():
+                self._events = [*self._events, *self._journal.news()][-8:]
+                scene = self._scene(executive)
+                if scene is not None:
+                    scene = _with_events(scene, self._events)
+                    live.update(draw(scene, self._question, str(self._folder.path)), refresh=True)
+                for key in pressed(REFRESH_S):
+                    self._press(executive, key)
+
+    def _press(self, executive: Executive, key: str) -> None:
+        if self._question is not None:
+            if key in "yYnN":
+                self._question = None
+                self._answer(key in "yY")
+            return
+        name = KEYS.get(key.lower())
+        if name is not None:
+            act(executive, name)
+
+
+def act(executive: Executive, name: str) -> None:
+    """Raise an operator's event from the view's thread."""
+    executive.raise_event_threadsafe(name, by="keyboard")
+
+
+def _with_events(scene: Scene, events: list[tuple[float, str]]) -> Scene:
+    from dataclasses import replace
+
+    return replace(scene, events=tuple(events))
+
+
+@contextlib.contextmanager
+def _keys() -> Iterator[Callable[[float], str]]:
+    """A function that waits so long for keys and returns those pressed. The terminal is as before afterwards."""
+    import termios
+    import tty
+
+    try:
+        before: list[Any] | None = termios.tcgetattr(sys.stdin)
+        tty.setcbreak(sys.stdin)
+    except (termios.error, ValueError, OSError):
+        before = None
+
+    def pressed(timeout_s: float) -> str:
+        if before is None:
+            time.sleep(timeout_s)
+            return ""
+        ready, _, _ = select.select([sys.stdin], [], [], timeout_s)
+        if not ready:
+            return ""
+        import os
+
+        keys = os.read(sys.stdin.fileno(), 32)
+        if not keys:  # the terminal went away: there is nobody to press anything
+            time.sleep(timeout_s)
+        return keys.decode(errors="ignore")
+
+    try:
+        yield pressed
+    finally:
+        if before is not None:
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

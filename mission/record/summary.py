@@ -1,0 +1,175 @@
+"""A run in numbers: summary.json, computed from the run's files alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mission.record.coverage import SHARP, share
+from mission.record.folder import RunFolder
+from mission.record.history import RunHistory
+from mission.record.row_file import plain
+
+UNWATCHED_S = 5.0
+"""A silence of vision longer than this means that nobody watched: while somebody does, missing images are lines too."""
+
+
+def write_summary(folder: RunFolder, wall_s: float | None = None) -> Mapping[str, Any]:
+    """Compute the summary and replace summary.json by it in one step."""
+    summary = summarise(RunHistory(folder), wall_s)
+    draft = folder.summary.with_suffix(".part")
+    draft.write_text(json.dumps(summary, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    draft.replace(folder.summary)
+    return summary
+
+
+def summarise(history: RunHistory, wall_s: float | None = None) -> Mapping[str, Any]:
+    """The summary of a run, finished or not. `wall_s` where the caller measured it; otherwise the run log tells."""
+    wall_s = wall_s if wall_s is not None else history.wall_s
+    duration_s = history.duration_s
+    end = history.end or {}
+    last = history.visits[-1].state if history.visits else None
+    summary: dict[str, Any] = {
+        "mission": history.mission.get("mission"),
+        "run": history.folder.name,
+        "outcome": end.get("outcome", "unfinished"),
+        "final_state": end.get("state", last),
+        "why": _why(history),
+        "simulated": history.simulated,
+        "duration_s": duration_s,
+        "wall_s": wall_s,
+        "speed_factor": duration_s / wall_s if wall_s else None,
+        "states": [
+            {"state": visit.state, "entered_s": visit.entered_s, "left_s": visit.left_s, "by": visit.by}
+            for visit in history.visits
+        ],
+        "standoff": _standoff(history),
+        "coverage": _coverage(history),
+        "tip": _found(history.memory.get("tip_station_m")),
+        "root": _found(history.memory.get("root_station_m")),
+        "vision": _vision(history.cycles),
+        "frames": len(history.frames),
+        "setpoints": _setpoints(history.setpoints),
+    }
+    truth = _truth(history)
+    if truth is not None:
+        summary["truth"] = truth
+    result: Mapping[str, Any] = plain(summary)
+    return result
+
+
+def _why(history: RunHistory) -> str | None:
+    """The event that first led out of the inspection and what was said with it; None for a completed run."""
+    if (history.end or {}).get("outcome") == "completed":
+        return None
+    said: Mapping[str, Any] = {}
+    for line in history.journal:
+        if line["kind"] == "event":
+            said = line
+        elif line["kind"] == "transition" and str(line["to"]).partition(".")[0] in ("abort", "aborted", "refused"):
+            data = said.get("data") or {}
+            reason = data.get("reason") or data.get("error") or data.get("text")
+            where = f"in {line['from']}"
+            return f"{line['event']} {where}: {reason}" if reason else f"{line['event']} {where}"
+    return None
+
+
+def _standoff(history: RunHistory) -> Mapping[str, float | None]:
+    """The estimated distance to the blade while its edges were being followed, held against the wanted one."""
+    target = history.parameters_of("follow_edge").get("standoff_m")
+    if target is None:
+        target = (history.mission.get("parameters") or {}).get("standoff_m")
+    kept = np.array(
+        [
+            line["estimate"]["distance_m"]
+            for line in history.cycles
+            if line.get("side") and (line.get("estimate") or {}).get("distance_m") is not None
+        ],
+        float,
+    )
+    if target is None or not len(kept):
+        return {"target_m": target, "rmse_m": None, "min_m": None, "max_m": None}
+    return {
+        "target_m": float(target),
+        "rmse_m": float(np.sqrt(np.mean((kept - float(target)) ** 2))),
+        "min_m": float(kept.min()),
+        "max_m": float(kept.max()),
+    }
+
+
+def _coverage(history: RunHistory) -> Mapping[str, float]:
+    """Share of the span whose edge of that side was in a recorded, sharp, accepted frame, as the program believes."""
+    turbine = history.mission.get("turbine") or {}
+    root_m = turbine.get("root_radius_m")
+    if root_m is None or turbine.get("blade_length_m") is None:
+        return {}
+    found: dict[str, list[tuple[float, float]]] = {}
+    for line in history.frames:
+        stretches = found.setdefault(str(line["side"]), [])
+        if line.get("accepted") and (line.get("sharpness") or 0.0) >= SHARP and line.get("edge_m"):
+            stretches.append((line["edge_m"][0], line["edge_m"][1]))
+    tip_m = root_m + turbine["blade_length_m"]
+    return {side: share(stretches, root_m, tip_m) for side, stretches in found.items()}
+
+
+def _found(station_m: float | None) -> Mapping[str, Any]:
+    return {"found": station_m is not None, "radius_m": station_m}
+
+
+def _vision(cycles: Sequence[Mapping[str, Any]]) -> Mapping[str, float | None]:
+    accepted = sum(bool(line.get("accepted")) for line in cycles)
+    elapsed = [line["elapsed_ms"] for line in cycles if line.get("elapsed_ms") is not None]
+    return {
+        "cycles": len(cycles),
+        "accepted": accepted,
+        "bridged": len(cycles) - accepted,
+        "longest_gap_s": _longest_gap(cycles),
+        "p50_ms": float(np.percentile(elapsed, 50)) if elapsed else None,
+        "p99_ms": float(np.percentile(elapsed, 99)) if elapsed else None,
+    }
+
+
+def _longest_gap(cycles: Iterable[Mapping[str, Any]]) -> float | None:
+    """Longest time between two accepted cycles, or from one to the end of the watch."""
+    longest, since, before = None, None, None
+    for line in cycles:
+        stamp = line.get("stamp")
+        if stamp is None:
+            continue
+        if before is None or stamp - before > UNWATCHED_S:
+            since = None
+        before = stamp
+        if since is not None:
+            longest = max(longest or 0.0, stamp - since)
+        if line.get("accepted"):
+            since = stamp
+    return longest
+
+
+def _setpoints(rows: Sequence[Mapping[str, str]]) -> Mapping[str, float | None]:
+    """Rate on the wall's clock and the longest gap within a stream."""
+    if len(rows) < 2:
+        return {"sent": len(rows), "rate_hz": None, "longest_gap_ms": None}
+    wall = np.array([float(row["wall_s"]) for row in rows])
+    first = np.array([row.get("first") == "1" for row in rows])
+    gaps = np.diff(wall)[~first[1:]]
+    total = float(gaps.sum())
+    return {
+        "sent": len(rows),
+        "rate_hz": len(gaps) / total if total > 0 else None,
+        "longest_gap_ms": 1000.0 * float(gaps.max()) if len(gaps) else None,
+    }
+
+
+def _truth(history: RunHistory) -> Mapping[str, Any] | None:
+    """What the simulated world knows of the run; None outside simulation."""
+    if not history.folder.truth.is_file():
+        return None
+    try:
+        from devices.world.truth import truth_of_run
+    except ImportError:
+        return None
+    return truth_of_run(history.folder.path)
