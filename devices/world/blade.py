@@ -1,4 +1,5 @@
-"""The shape of one blade in its own coordinates: station along the span, offset toward the leading side, depth to the back."""
+"""The shape of one blade in its own coordinates: station along the span, offset to the leading side, depth to the
+back."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 TipShape = Literal["round", "square", "spiked"]
 
-# Share of the blade's length → share of the way from the root's diameter to the largest chord, and from there to the tip's.
+# Share of the length → share of the way from the root's diameter to the largest chord, and from there to the tip's.
 _INBOARD = ((0.0, 0.0), (0.03, 0.0), (0.10, 0.55), (0.20, 1.0))
 _OUTBOARD = ((0.35, 0.26), (0.50, 0.47), (0.65, 0.65), (0.80, 0.82), (0.92, 0.935), (1.0, 1.0))
 _THICKNESS = ((0.0, 1.0), (0.03, 1.0), (0.10, 0.62), (0.20, 0.36), (0.35, 0.26), (0.5, 0.21), (0.75, 0.18), (1.0, 0.16))
@@ -34,8 +35,8 @@ def _curve(knots: tuple[tuple[float, float], ...], x: Array) -> Array:
 class Blade:
     """A blade with a round root, an aerofoil from the largest chord on, twist, taper and a tip of its own shape.
 
-    Stations are metres from the hub's centre; the blade runs from root_radius_m over length_m. pitch in radians turns the
-    whole blade about its axis, leading edge to the front.
+    Stations are metres from the hub's centre; the blade runs from root_radius_m over length_m. pitch in radians turns
+    the whole blade about its axis, leading edge to the front.
     """
 
     root_radius_m: float
@@ -53,7 +54,7 @@ class Blade:
 
     @cached_property
     def stations(self) -> Array:
-        """Stations (n,) that the mesh is built on: 0.25 m apart, closer where the chord changes quickly and at the tip."""
+        """Stations (n,) that the mesh is built on: 0.25 m apart, closer at the tip."""
         end = self.tip_radius_m
         cap = self._cap_m
         inner = np.arange(self.root_radius_m, end - cap, 0.25)
@@ -82,8 +83,8 @@ class Blade:
         return np.maximum(chord, 2e-3)
 
     def sections(self, stations: Array, around: int = 56) -> Array:
-        """Outlines (n, around + 1, 3) in (station, offset, depth) m: from the trailing edge over the back to the leading edge
-        and over the front to the trailing edge again."""
+        """Outlines (n, around + 1, 3) in (station, offset, depth) m: from the trailing edge over the back to the
+        leading edge and over the front to the trailing edge again."""
         stations = np.asarray(stations, float)
         share = (stations - self.root_radius_m) / self.length_m
         chord, ratio, axis = self.chord_m(stations), _curve(_THICKNESS, share), _curve(_AXIS, share)
@@ -109,7 +110,7 @@ class Blade:
         return outline
 
     def edges(self, stations: Array) -> tuple[Array, Array]:
-        """Leading and trailing edge as seen from the front: points (n, 3) of greatest and least offset at stations (n,)."""
+        """Leading and trailing edge as seen from the front: points (n, 3) of greatest and of least offset."""
         outline = self.sections(stations, around=224)
         rows = np.arange(len(outline))
         return outline[rows, outline[..., 1].argmax(axis=1)], outline[rows, outline[..., 1].argmin(axis=1)]

@@ -29,9 +29,9 @@ class Surface:
 
 @dataclass(frozen=True)
 class Mesh:
-    """vertices (n, 3) m in local NED with outward unit normals (n, 3) and skin coordinates (n, 2); triangles (m, 3), their
-    corners counter-clockwise as seen from outside by a right-handed viewer; part (m,). Triangles [start[k], start[k + 1])
-    form cluster k, inside the sphere `centre[k]`, `radius[k]`."""
+    """vertices (n, 3) m in local NED with outward unit normals (n, 3) and skin coordinates (n, 2); triangles (m, 3),
+    their corners so ordered that (b - a) × (c - a) points outward; part (m,). Triangles [start[k], start[k + 1]) form
+    cluster k, inside the sphere `centre[k]`, `radius[k]`."""
 
     vertices: Array
     normals: Array

@@ -48,7 +48,7 @@ class Light(_Section):
     sun_azimuth_deg: Degrees = Field(215.0, description="Where the sun stands, clockwise from north.")
     sun_elevation_deg: float = Field(38.0, ge=0, le=90, description="How high it stands.")
     ambient: Share = Field(0.62, description="Share of the light that comes from the sky rather than the sun.")
-    blade_brightness: float = Field(150.0, ge=0, le=255, description="Grey value of the lit, clean blade.")
+    blade_brightness: float = Field(185.0, ge=0, le=255, description="Grey value of the lit, clean blade.")
     background: str = Field("fields", pattern="^(fields|sea|plain)$", description="Ground: fields, sea, or plain grey.")
     clouds: Share = Field(0.5, description="How cloudy the sky is.")
 
@@ -62,6 +62,9 @@ class Lens(_Section):
     colour: bool = Field(True, description="BGR images; grey ones where false.")
     frame_gap_s: float = Field(0.0286, ge=0, le=1, description="Time between the laser-off and the laser-on exposure.")
     antialias: bool = Field(True, description="Smooth silhouettes, as a real lens does; false is faster.")
+    streak_px: float = Field(
+        1.0, ge=0, le=40, description="Length of the laser's spots beyond their height, of 612 px."
+    )
     vignette: Share = Field(0.12, description="Share of the light that is lost in the image corners.")
 
 

@@ -24,7 +24,7 @@ BLADES = (INSPECTED, SECOND, THIRD)
 
 @dataclass(frozen=True)
 class TurbineShape:
-    """A three-bladed turbine. north_m, east_m: the tower's axis at the ground, in local NED; ground_m: its foot above home.
+    """A three-bladed turbine. north_m, east_m: the tower's axis in local NED; ground_m: its foot above home.
 
     heading_deg: from the front through the hub to the back, clockwise from north. azimuth_deg: of the inspected blade,
     clockwise as seen from the front, 0 = up. Blade coordinates are (station, offset, depth) as in `BladeFrame`.

@@ -1,0 +1,91 @@
+"""A rig whose images are drawn from the vehicle's true pose in the simulated world."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.rig import CaptureError
+from devices.world.view import draw
+from devices.world.world import TruePose, World
+from vision.camera import RigGeometry
+from vision.capture import CameraPose, StereoFrames, camera_pose
+
+Array = NDArray[np.float64]
+
+
+class SimulatedRig:
+    """The simulated cameras and laser. Implements `devices.rig.Rig`.
+
+    true_pose: where the vehicle truly is now. now: the executive's clock, which stamps the frames unless the pose
+    brings its own stamp. mount (3,) m: the left lens in body axes. Two rigs with one seed, asked for the same poses in
+    the same order, deliver the same bytes."""
+
+    simulated = True
+
+    def __init__(
+        self,
+        world: World,
+        geometry: RigGeometry,
+        mount: Array,
+        true_pose: Callable[[], TruePose],
+        now: Callable[[], float],
+    ) -> None:
+        self.world = world
+        self.geometry = geometry
+        self.mount = np.asarray(mount, float)
+        self._true_pose = true_pose
+        self._now = now
+        self._laser_armed = True
+        self._count = 0
+        self._lock = threading.Lock()
+
+    def capture(self, laser: bool = True) -> StereoFrames:
+        """One set of frames; see `devices.rig.Rig.capture` and the fault switches of the world."""
+        with self._lock:
+            if laser and not self._laser_armed:
+                raise CaptureError("the laser is not armed")
+            faults, now = self.world.faults, self._now()
+            self._count += 1
+            if faults.active("images", now) or faults.active("blackout", now):
+                raise CaptureError("no images: the simulated cameras deliver nothing (world.faults)")
+            true = self._true_pose()
+            pose = camera_pose(true.position, true.attitude, true.gimbal, self.mount)
+            frames = draw(
+                self.world.renderer,
+                self.geometry,
+                pose,
+                laser=laser,
+                lit=not faults.active("laser_off", now),
+                stamp_s=now if true.stamp_s is None else true.stamp_s,
+                frame=self._count,
+                shift=self._shift(true, pose),
+            )
+            if faults.active("left_eye", now):
+                frames = replace(frames, left=None, left_laser=None)
+            if faults.active("right_eye", now):
+                frames = replace(frames, right=None, right_laser=None)
+            return frames
+
+    def _shift(self, true: TruePose, pose: CameraPose) -> tuple[float, float]:
+        """Pixels that the scene in the middle of the image moves by between the laser-off and the laser-on exposure."""
+        gap = self.world.settings.camera.frame_gap_s
+        if true.velocity is None or gap == 0:
+            return 0.0, 0.0
+        camera = self.geometry.stereo.left
+        ahead = self.world.renderer.distance_ahead(pose)
+        step = np.asarray(true.velocity) * gap @ pose.rotation
+        return float(-camera.fx * step[1] / ahead), float(-camera.fy * step[2] / ahead)
+
+    def set_laser(self, on: bool) -> None:
+        """Arm or disarm the laser."""
+        with self._lock:
+            self._laser_armed = on
+
+    def close(self) -> None:
+        """Nothing to release."""
+        self.set_laser(False)
