@@ -124,18 +124,21 @@ def outcomes() -> Mapping[str, Event]:
     for behaviour in behaviours().values():
         for name, text in behaviour.outcomes.items():
             if name not in EVENTS:
-                found.setdefault(name, Event(name, "behaviour", Severity.INFO, text))
+                found.setdefault(name, Event(name, "behaviour", Severity.INFO, text, "failed"))
     return found
 
 
 def fallbacks(name: str) -> tuple[str, ...]:
-    """The event followed by those it falls back to, in the order in which handlers are sought."""
+    """The event followed by those it falls back to, in the order in which handlers are sought.
+
+    An outcome that nobody answers (any more: its retries may be used up) falls back to `failed`.
+    """
     chain: list[str] = []
     following: str | None = name
     while following is not None and following not in chain:
         chain.append(following)
         known = EVENTS.get(following)
-        following = known.falls_back_to if known else None
+        following = known.falls_back_to if known else "failed"
     return tuple(chain)
 
 
