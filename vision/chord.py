@@ -1,0 +1,39 @@
+"""The blade's width in metres between its two edges, on the measured surface."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.camera import Camera
+from vision.edges import Candidate
+from vision.surface import Surface
+
+Array = NDArray[np.float64]
+
+
+def chord(
+    edges: tuple[Candidate, ...], axis: float, camera: Camera, surface: Surface, near: Array
+) -> tuple[float, float] | None:
+    """(chord, its standard deviation) in metres at the station of the blade nearest to `near` (2,), image frame; None unless
+    both edges are seen."""
+    if len(edges) != 2:
+        return None
+    along = np.array([np.cos(axis), np.sin(axis)])
+    across = np.array([-along[1], along[0]])
+    station = float(near @ along)
+    points = []
+    for edge in edges:
+        offset = (edge.rho - station * float(edge.outward @ along)) / float(edge.outward @ across)
+        points.append(station * along + offset * across)
+    rays = camera.rays(np.array(points) + camera.centre)
+    inverse = (1 - rays[:, 1:] @ surface.slope) / surface.depth_m
+    if (inverse <= 0).any():
+        return None
+    ends = rays / inverse[:, None]
+    width = float(np.linalg.norm(ends[0] - ends[1]))
+    pixel = float(ends[:, 0].mean()) / camera.fx
+    edge_sigma = np.hypot(*(edge.profile.rho_sigma[edge.index] for edge in edges)) * pixel
+    lever = np.array([1.0, *ends.mean(axis=0)[1:]]) / max(surface.depth_m, 1e-6)
+    depth_sigma = width * np.sqrt(max(float(lever @ surface.covariance @ lever), 0.0))
+    return width, float(np.sqrt(edge_sigma**2 + depth_sigma**2 + (0.004 * width) ** 2))

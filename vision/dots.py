@@ -1,0 +1,130 @@
+"""Finds laser dots to a fraction of a pixel in the difference between a laser-on and a laser-off image (2.75)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.capture import Image
+
+Array = NDArray[np.float64]
+
+NEIGHBOURHOOD = 15  # px, what a dot is compared with; about half the spacing of the grid
+REACH = 5  # px, half the window of the centroid
+MOST = 420  # candidates kept, the strongest; the grid has 121 dots
+LARGEST_MOTION = 12.0  # px between laser-off and laser-on
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Bright compact spots that the laser may have made: uv (n, 2) px, level above the surroundings, sigma_px (n,)."""
+
+    uv: Array
+    level: Array
+    sigma_px: Array
+
+    def __len__(self) -> int:
+        return len(self.uv)
+
+
+def motion_between(off: Image, on: Image) -> Array:
+    """Shift (2,) px that brings the laser-off image onto the laser-on image: by phase correlation of quarter images.
+
+    Zero where the images do not support a shift: it must bring them clearly closer together.
+    """
+    small = [cv2.resize(image, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA) for image in (off, on)]
+    quiet = _difference(small[0], small[1], np.zeros(2))
+    first, second = (image.astype(np.float32) for image in small)
+    window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
+    shift, _ = cv2.phaseCorrelate(first, second, window)
+    motion = np.array(shift)
+    if np.hypot(*motion) * 4 > LARGEST_MOTION or np.hypot(*motion) * 4 < 0.2:
+        return np.zeros(2)
+    return motion * 4 if _difference(small[0], small[1], motion) < 0.9 * quiet else np.zeros(2)
+
+
+def _difference(off: Image, on: Image, shift: Array) -> float:
+    inner = slice(4, -4)
+    moved = shifted(off, shift) if shift.any() else off
+    return float(cv2.norm(moved[inner, inner], on[inner, inner], cv2.NORM_L1))
+
+
+def shifted(image: Image, motion: Array) -> Image:
+    """The image moved by (right, down) px."""
+    transform = np.array([[1.0, 0.0, motion[0]], [0.0, 1.0, motion[1]]])
+    return cv2.warpAffine(
+        image, transform, (image.shape[1], image.shape[0]), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+
+
+def find_spots(off: Image, on: Image) -> Spots:
+    """Spots that are in `on` and not in `off`, both (h, w) uint8 of working size; the strongest MOST of them."""
+    motion = motion_between(off, on)
+    still = shifted(off, motion) if motion.any() else off
+    difference = cv2.subtract(on, still)
+    if motion.any():
+        margin = int(np.ceil(np.abs(motion).max())) + 1
+        for border in (difference[:margin], difference[-margin:], difference[:, :margin], difference[:, -margin:]):
+            border[:] = 0
+    smooth = cv2.blur(difference, (3, 3))
+    response = cv2.subtract(smooth, cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
+    noise = float(np.mean(difference[::4, ::4])) + 0.3
+    peaks = _peaks(response, max(3.0, 2.0 * noise))
+    return _centroids(on, still, peaks)
+
+
+def _peaks(response: Image, threshold: float) -> NDArray[np.int64]:
+    """Local maxima (n, 2) (u, v) above a threshold, the strongest first."""
+    highest = cv2.dilate(response, np.ones((7, 7), np.uint8))
+    _, strong = cv2.threshold(response, threshold, 255, cv2.THRESH_BINARY)
+    mask = cv2.bitwise_and(cv2.compare(response, highest, cv2.CMP_EQ), strong)
+    found = cv2.findNonZero(mask)
+    if found is None:
+        return np.empty((0, 2), np.int64)
+    uv = found.reshape(-1, 2).astype(np.int64)
+    order = np.argsort(-response[uv[:, 1], uv[:, 0]].astype(np.int64), kind="stable")
+    return uv[order[:MOST]]
+
+
+def _centroids(on: Image, off: Image, peaks: NDArray[np.int64]) -> Spots:
+    height, width = on.shape
+    inside = (peaks[:, 0] >= 2) & (peaks[:, 1] >= 2) & (peaks[:, 0] < width - 2) & (peaks[:, 1] < height - 2)
+    peaks = peaks[inside]
+    if len(peaks) == 0:
+        return Spots(np.empty((0, 2)), np.empty(0), np.empty(0))
+    reach = np.arange(-REACH, REACH + 1)
+    dv, du = np.meshgrid(reach, reach, indexing="ij")
+    v = np.clip(peaks[:, 1, None, None] + dv, 0, height - 1)
+    u = np.clip(peaks[:, 0, None, None] + du, 0, width - 1)
+    patch = on[v, u].astype(np.float32) - off[v, u].astype(np.float32)
+    ring = np.hypot(dv, du) > REACH - 0.8
+    around = patch[:, ring]
+    base = np.median(around, axis=1)
+    noise = 1.4826 * np.median(np.abs(around - base[:, None]), axis=1) + 0.25
+    patch -= base[:, None, None]
+    centre = np.zeros((len(peaks), 2))
+    for reach_px in (3.5, 3.0, 3.0):
+        distance2 = (du - centre[:, 0, None, None]) ** 2 + (dv - centre[:, 1, None, None]) ** 2
+        window = np.exp(-0.5 * distance2 / (reach_px / 1.8) ** 2)
+        weight = np.maximum(patch, 0) * window
+        total = weight.sum(axis=(1, 2)) + 1e-6
+        offset = np.stack([(weight * du).sum(axis=(1, 2)), (weight * dv).sum(axis=(1, 2))], axis=1) / total[:, None]
+        # a window on a spot of like width halves the offset: twice the step, kept within the patch
+        centre = np.clip(centre + 1.6 * (offset - centre), -2.5, 2.5)
+    level = (patch * window).sum(axis=(1, 2)) / window.sum(axis=(1, 2))
+    spread2 = (weight * distance2).sum(axis=(1, 2)) / total
+    sigma = np.hypot(0.04, 1.1 * noise * np.sqrt(spread2) / np.maximum(total, 1e-3) * 3.0)
+    keep = (level > 1.2 * noise / 2) & (level > 0.8)
+    uv = peaks + centre
+    keep &= _first_of_each(uv, 4.0)
+    return Spots(uv[keep], level[keep].astype(float), sigma[keep])
+
+
+def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:
+    """Which points have no earlier point within a distance."""
+    distance = np.hypot(*(uv[:, None] - uv[None]).transpose(2, 0, 1))
+    near = np.triu(distance < apart_px, 1)
+    return ~near.any(axis=0)

@@ -1,0 +1,215 @@
+"""Straight steps of brightness: candidates by a gradient-directed Hough transform, refined on profiles across each line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.capture import Image
+
+Array = NDArray[np.float64]
+
+ANGLES = 90  # bins of 2° modulo 180°
+SPREAD = 2  # bins to each side that a pixel votes for: its gradient's direction is no better known
+RHO_STEP = 2.0  # px of the half-size image
+REACH = 7  # px across a candidate line within which its step is looked for
+SAMPLES = 96  # profiles along a candidate line
+
+
+def grey_noise(grey: Image) -> float:
+    """Standard deviation of the sensor noise, grey levels, from what a small blur takes away in the quiet half of the image."""
+    part = grey[::2]
+    rough = part[:, 1:-1:5].astype(np.int16) * 2 - part[:, :-2:5] - part[:, 2::5]
+    return max(0.6, 1.4826 * float(np.median(np.abs(rough))) / np.sqrt(6.0))
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """Edge pixels of the half-size image: position (n, 2) in px of the working image's frame, direction, weight ≤ 1."""
+
+    position: Array
+    angle: Array
+    weight: Array
+
+
+def edge_pixels(grey: Image, noise: float, masked: Array) -> Gradients:
+    """Pixels whose brightness changes by more than noise; those within 7 px of the points `masked` (n, 2) are left out."""
+    half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    half = cv2.blur(half, (3, 3))
+    dx, dy = cv2.Sobel(half, cv2.CV_16S, 1, 0), cv2.Sobel(half, cv2.CV_16S, 0, 1)
+    strength = cv2.addWeighted(cv2.convertScaleAbs(dx), 0.5, cv2.convertScaleAbs(dy), 0.5, 0)
+    if len(masked):
+        for u, v in np.rint(masked / 2).astype(int):
+            strength[max(v - 3, 0) : v + 4, max(u - 3, 0) : u + 4] = 0
+    threshold = max(2.0, 1.6 * noise)
+    v, u = np.nonzero(strength[2:-2, 2:-2] > threshold)
+    v, u = v + 2, u + 2
+    gx, gy = dx[v, u].astype(np.float32), dy[v, u].astype(np.float32)
+    weight = np.minimum(np.hypot(gx, gy) / (8 * threshold), 1.0)
+    centre = (np.array(grey.shape[::-1]) - 1) / 2
+    position = np.column_stack([u, v]) * 2 + 0.5 - centre
+    return Gradients(position, np.arctan2(gy, gx), weight)
+
+
+def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Array, Array]:
+    """(theta, rho) (k, 2) with theta in [0, π) and signed rho in working px, and votes (k,), the strongest first.
+
+    size: (width, height) of the working image.
+    """
+    reach = np.hypot(*size) / 4  # of the half-size image
+    bins = int(2 * reach / RHO_STEP) + 3
+    own = np.floor((pixels.angle % np.pi) / np.pi * ANGLES).astype(np.int64) % ANGLES
+    theta = (np.arange(ANGLES) + 0.5) * np.pi / ANGLES
+    cosine, sine = np.cos(theta), np.sin(theta)
+    x, y = pixels.position[:, 0] / 2, pixels.position[:, 1] / 2
+    votes = np.zeros(ANGLES * bins)
+    for step in range(-SPREAD, SPREAD + 1):
+        angle = (own + step) % ANGLES
+        rho = x * cosine[angle] + y * sine[angle]
+        place = np.rint((rho + reach) / RHO_STEP).astype(np.int64) + 1
+        votes += np.bincount(angle * bins + place, pixels.weight, votes.size)[: votes.size]
+    table = votes.reshape(ANGLES, bins).astype(np.float32)
+    wrapped = np.vstack([table[-2:, ::-1], table, table[:2, ::-1]])
+    wrapped = cv2.blur(wrapped, (3, 1))
+    highest = cv2.dilate(wrapped, np.ones((5, 5), np.uint8))
+    peaks = (wrapped == highest)[2:-2] & (wrapped[2:-2] > 4)
+    a, r = np.nonzero(peaks)
+    strength = wrapped[2:-2][a, r].astype(float)
+    order = np.argsort(-strength, kind="stable")[:most]
+    rho = ((r[order] - 1) * RHO_STEP - reach) * 2
+    return np.column_stack([theta[a[order]], rho]), strength[order]
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """K lines, each sampled at SAMPLES places: refined normals (k, 2), rho (k,) signed along them (image frame, px), places
+    `t` (k, m) along the direction (normal turned by +90°), offset (k, m) px of the step from the refined line, signed step
+    (k, m) in grey levels along the normal, and `agrees` (k, m): the step is real and lies on the line."""
+
+    normal: Array
+    rho: Array
+    t: Array
+    offset: Array
+    step: Array
+    agrees: NDArray[np.bool_]
+    slope_sigma: Array
+    rho_sigma: Array
+
+    @property
+    def direction(self) -> Array:
+        """Unit directions (k, 2)."""
+        return np.column_stack([-self.normal[:, 1], self.normal[:, 0]])
+
+
+def visible_stretch(normal: Array, rho: Array, half: Array) -> tuple[Array, Array]:
+    """First and last place (k,) along each line inside the image of half extents `half` (2,); equal where it misses it."""
+    direction = np.column_stack([-normal[:, 1], normal[:, 0]])
+    foot = normal * rho[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, two = (-half - foot) / direction, (half - foot) / direction
+    first, last = np.fmin(one, two), np.fmax(one, two)
+    outside = (np.abs(direction) < 1e-9) & (np.abs(foot) > half)
+    start = np.nanmax(np.where(np.isfinite(first), first, -np.inf), axis=1)
+    end = np.nanmin(np.where(np.isfinite(last), last, np.inf), axis=1)
+    return start, np.where(outside.any(axis=1), start, np.maximum(end, start))
+
+
+def refine_lines(
+    smooth: Image, normal: Array, rho: Array, noise: float, focus: Array, reach: int = REACH, slopes_deg: float = 2.0
+) -> Profiles:
+    """Lines fitted to the steepest steps across each of K candidate lines, robustly.
+
+    smooth: the grey image after a 3 × 3 mean. normal (k, 2), rho (k,) in the image frame. focus (k,): the place along each
+    line around which it is to be right, where the edge bends.
+    """
+    height, width = smooth.shape
+    centre = np.array([(width - 1) / 2, (height - 1) / 2])
+    start, end = visible_stretch(normal, rho, centre - 3)
+    share = np.linspace(0, 1, SAMPLES)
+    t = start[:, None] + (end - start)[:, None] * share
+    direction = np.column_stack([-normal[:, 1], normal[:, 0]])
+    across = np.arange(-reach - 1, reach + 2, dtype=float)
+    base = (
+        (rho[:, None, None] + across) * normal[:, 0, None, None],
+        (rho[:, None, None] + across) * normal[:, 1, None, None],
+    )
+    u = (base[0] + t[..., None] * direction[:, 0, None, None] + centre[0]).astype(np.float32)
+    v = (base[1] + t[..., None] * direction[:, 1, None, None] + centre[1]).astype(np.float32)
+    flat = (-1, len(across))
+    values = cv2.remap(
+        smooth, u.reshape(flat), v.reshape(flat), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    ).reshape(u.shape)
+    values = values.astype(np.float32)
+    gradient = values[..., 2:] - values[..., :-2]
+    gradient = (gradient + 0.5 * (np.roll(gradient, 1, 1) + np.roll(gradient, -1, 1))) / 2
+    size = np.abs(gradient)
+    best = np.argmax(size[..., 1:-1], axis=-1) + 1
+    take = lambda shift: np.take_along_axis(size, (best + shift)[..., None], -1)[..., 0]  # noqa: E731
+    before, peak, after = take(-1), take(0), take(1)
+    bend = before - 2 * peak + after
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fraction = np.where(bend < 0, 0.5 * (before - after) / bend, 0.0)
+    offset = across[1:-1][best] + np.clip(fraction, -0.5, 0.5)
+    step = np.take_along_axis(gradient, best[..., None], -1)[..., 0]
+    real = peak > max(1.2, 1.4 * noise)
+    slope, shift = _vote_slope(t - focus[:, None], offset, real, slopes_deg)
+    weight = real.astype(float)
+    for tolerance in (2.0, 1.2, 1.0, 1.0):
+        residual = offset - (shift[:, None] + slope[:, None] * (t - focus[:, None]))
+        near = np.exp(-0.5 * ((t - focus[:, None]) / 220) ** 2)
+        weight = real * near / (1 + (residual / tolerance) ** 2) ** 2
+        slope, shift = _weighted_line(t - focus[:, None], offset, weight, slope, shift)
+    residual = offset - (shift[:, None] + slope[:, None] * (t - focus[:, None]))
+    agrees = real & (np.abs(residual) < 1.5)
+    turn = np.arctan(slope)
+    new_normal = np.column_stack(
+        [
+            normal[:, 0] * np.cos(turn) - direction[:, 0] * np.sin(turn),
+            normal[:, 1] * np.cos(turn) - direction[:, 1] * np.sin(turn),
+        ]
+    )
+    point = normal * (rho + shift)[:, None] + direction * focus[:, None]
+    new_rho = (new_normal * point).sum(axis=1)
+    count = np.maximum(agrees.sum(axis=1), 1)
+    scatter = np.sqrt((residual**2 * agrees).sum(axis=1) / count) + 0.1
+    spread = np.sqrt(((t - focus[:, None]) ** 2 * agrees).sum(axis=1) / count) + 3.0
+    free = np.maximum(count / 3, 1)  # neighbouring profiles share pixels
+    slope_sigma = scatter / spread / np.sqrt(free)
+    rho_sigma = np.hypot(scatter / np.sqrt(free), 0.08)
+    return Profiles(new_normal, new_rho, t, residual, step, agrees, slope_sigma, rho_sigma)
+
+
+def _vote_slope(t: Array, offset: Array, real: NDArray[np.bool_], slopes_deg: float) -> tuple[Array, Array]:
+    """Slope and offset (k,) on which most of the steps lie, by trying slopes and counting offsets."""
+    slopes = np.tan(np.deg2rad(np.linspace(-slopes_deg, slopes_deg, 13)))
+    bins = 40
+    lines = len(t)
+    index = np.arange(lines)[:, None]
+    best = np.full(lines, -1.0)
+    slope, shift = np.zeros(lines), np.zeros(lines)
+    near = real * np.exp(-0.5 * (t / 220) ** 2)
+    for tried in slopes:
+        place = np.clip(np.rint(offset - tried * t), -bins // 2 + 1, bins // 2 - 1).astype(np.int64) + bins // 2
+        counts = np.bincount((index * bins + place).ravel(), near.ravel(), lines * bins).reshape(lines, bins)
+        counts[:, 1:-1] += 0.6 * (counts[:, :-2] + counts[:, 2:])
+        counts[:, [0, 1, -2, -1]] = 0
+        top = counts.argmax(axis=1)
+        value = counts[np.arange(lines), top] - 1e-3 * abs(tried)
+        better = value > best
+        best[better], slope[better], shift[better] = value[better], tried, (top - bins // 2)[better]
+    return slope, shift
+
+
+def _weighted_line(t: Array, offset: Array, weight: Array, slope: Array, shift: Array) -> tuple[Array, Array]:
+    total = weight.sum(axis=1)
+    safe = np.maximum(total, 1e-9)
+    mean_t, mean_o = (weight * t).sum(axis=1) / safe, (weight * offset).sum(axis=1) / safe
+    dt = t - mean_t[:, None]
+    variance = (weight * dt**2).sum(axis=1)
+    new = (weight * dt * offset).sum(axis=1) / np.maximum(variance, 1e-9)
+    good = (total > 2) & (variance > 50)
+    new_slope = np.where(good, np.clip(new, -0.3, 0.3), slope)
+    return new_slope, np.where(good, mean_o - new_slope * mean_t, shift)

@@ -1,0 +1,234 @@
+"""The eye: four images in, one observation of the blade out, or the reasons why there is none."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.camera import RigGeometry
+from vision.capture import Image, StereoFrames
+from vision.chord import chord
+from vision.dots import Spots, find_spots
+from vision.edges import Candidate, OtherEye, edge_of, find_edges
+from vision.grid import Matches, grid_coordinates, match_eyes, match_laser
+from vision.lines import grey_noise
+from vision.observation import BladeObservation, Dots, Line, Tip
+from vision.quality import exposure, sharpness
+from vision.reduction import Reduced, reduce_image, reduction_factor, to_full
+from vision.surface import Surface, fit_surface
+from vision.tip import find_tip
+
+Array = NDArray[np.float64]
+
+LEAST_DOTS = 5
+SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade
+
+
+class Stopwatch:
+    """Milliseconds per stage."""
+
+    def __init__(self) -> None:
+        self.elapsed_ms: dict[str, float] = {}
+        self._last = self._first = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        now = time.perf_counter()
+        self.elapsed_ms[stage] = self.elapsed_ms.get(stage, 0.0) + 1e3 * (now - self._last)
+        self.elapsed_ms["total"] = 1e3 * (now - self._first)
+        self._last = now
+
+
+class Eye:
+    """Observes blades with one rig. Holds no state between frames and may be shared by threads.
+
+    Dots, points and edges all belong to the instant of the laser-on images; the laser-off images only tell the dots apart.
+    """
+
+    def __init__(self, geometry: RigGeometry) -> None:
+        self.geometry = geometry
+        self.factor = reduction_factor(geometry.stereo.left.width)
+        self._stereo = geometry.stereo.shrunk(self.factor)
+
+    def observe(self, frames: StereoFrames) -> BladeObservation:
+        """The blade as these frames show it. Never raises on what is in the images; a wrong size is a ValueError."""
+        watch = Stopwatch()
+        missing = [name for name in ("left", "left_laser") if getattr(frames, name) is None]
+        if missing:
+            return self._refused(frames, watch, f"no {' and no '.join(missing)} image")
+        images: dict[str, Reduced] = {}
+        for name in ("left", "left_laser", "right", "right_laser"):
+            image: Image | None = getattr(frames, name)
+            if image is not None:
+                self._check_size(name, image)
+                images[name] = reduce_image(image, self.factor)
+        watch.lap("reduce")
+        both = "right" in images and "right_laser" in images
+        left = find_spots(images["left"].green, images["left_laser"].green)
+        right = find_spots(images["right"].green, images["right_laser"].green) if both else None
+        watch.lap("dots")
+        laser = self.geometry.laser
+        if laser is None:
+            return self._refused(frames, watch, "the rig has no laser, so dots have no index")
+        rays = self._stereo.left.rays(left.uv)
+        focal = self._stereo.left.fx
+        if right is not None:
+            rays_right = self._stereo.right.rays(right.uv)
+            matches, ambiguous = match_eyes(
+                rays, rays_right, self._stereo, laser, left.sigma_px / focal, right.sigma_px / focal
+            )
+        else:
+            matches, ambiguous = match_laser(rays, laser, focal, left.sigma_px / focal)
+        watch.lap("match")
+        if ambiguous:
+            return self._refused(frames, watch, "the dots can be read in two ways that contradict each other")
+        blade = _blade_of(matches)
+        if len(blade) < LEAST_DOTS:
+            return self._refused(
+                frames, watch, f"{len(left)} spots in the left image, {len(blade)} of them dots on a blade"
+            )
+        surface = fit_surface(rays[blade.left], blade.inverse_depth, blade.sigma)
+        if surface is None:
+            return self._refused(frames, watch, f"{len(blade)} dots, all on one line: no surface")
+        blade = blade.take(surface.inliers)
+        watch.lap("surface")
+        return self._outlined(frames, images, left, right, rays, matches, blade, surface, watch)
+
+    def _outlined(
+        self,
+        frames: StereoFrames,
+        images: dict[str, Reduced],
+        left: Spots,
+        right: Spots | None,
+        rays: Array,
+        matches: Matches,
+        blade: Matches,
+        surface: Surface,
+        watch: Stopwatch,
+    ) -> BladeObservation:
+        factor, camera = self.factor, self._stereo.left
+        grey = images["left_laser"].grey
+        seeds = left.uv[blade.left]
+        other = None
+        if right is not None:
+            other = OtherEye(cv2.blur(images["right_laser"].grey, (3, 3)), self._stereo, surface)
+        edges, axis, reasons = find_edges(grey, seeds, left.uv, other)
+        watch.lap("edges")
+        dots = seeds - camera.centre
+        outline = find_tip(cv2.blur(grey, (3, 3)), grey_noise(grey), edges, axis, dots)
+        watch.lap("tip")
+        points = rays[blade.left] / blade.inverse_depth[:, None]
+        width = chord(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
+        tip = None
+        if outline is not None:
+            rho = outline.rho
+            normal = outline.normal if rho >= 0 else -outline.normal
+            tip = Tip(
+                Line(float(np.arctan2(normal[1], normal[0])), abs(rho) * factor),
+                outline.point * factor,
+                outline.sigma_px * factor,
+            )
+        heading, heading_sigma = _heading(edges, axis)
+        sharp = sharpness(grey, edges)
+        bright = exposure(images["left"].grey, seeds)
+        order = _left_first(edges, axis)
+        dots_left = self._dots(left, rays, matches, surface)
+        dots_right = None
+        if right is not None:
+            known = matches.right >= 0
+            dots_right = Dots(
+                to_full(right.uv[matches.right[known]], factor), matches.row[known], matches.column[known]
+            )
+        watch.lap("rest")
+        return BladeObservation(
+            stamp_s=frames.stamp_s,
+            valid=True,
+            reasons=reasons,
+            dots_left=dots_left,
+            dots_right=dots_right,
+            matches=np.column_stack([matches.row, matches.column]) if right is not None else None,
+            points=points,
+            sigma_m=blade.sigma / blade.inverse_depth**2,
+            normal=surface.normal,
+            plane_point=np.array([surface.depth_m, 0.0, 0.0]),
+            plane_covariance=surface.covariance,
+            distance_m=surface.depth_m,
+            distance_sigma_m=float(np.sqrt(surface.covariance[0, 0])),
+            nearest_m=float(np.linalg.norm(points, axis=1).min()),
+            edges=tuple(edge_of(edges[k], factor) for k in order),
+            tip=tip,
+            heading=heading,
+            heading_sigma=heading_sigma,
+            chord_m=width[0] if width else None,
+            chord_sigma_m=width[1] if width else None,
+            sharpness=sharp,
+            exposure=bright,
+            elapsed_ms=watch.elapsed_ms,
+        )
+
+    def _dots(self, left: Spots, rays: Array, matches: Matches, surface: Surface) -> Dots:
+        """Every dot of the left image with its index: the matched ones, and those that the surface explains."""
+        laser = self.geometry.laser
+        assert laser is not None
+        uv, row, column = left.uv[matches.left], matches.row, matches.column
+        rest = np.setdiff1d(np.arange(len(left)), matches.left)
+        inverse = surface.inverse_depth(rays[rest])
+        rest, inverse = rest[inverse > 0.03], inverse[inverse > 0.03]
+        if len(rest):
+            place = grid_coordinates(rays[rest] / inverse[:, None], laser)
+            whole = np.rint(place)
+            taken = set(zip(row.tolist(), column.tolist(), strict=True))
+            fits = (np.abs(place - whole).max(axis=1) < 0.08) & (whole >= 0).all(axis=1)
+            fits &= (whole < (laser.rows, laser.columns)).all(axis=1)
+            for index, (r, c) in zip(rest[fits], whole[fits].astype(int).tolist(), strict=True):
+                if (r, c) not in taken:
+                    taken.add((r, c))
+                    uv, row, column = np.vstack([uv, left.uv[index]]), np.append(row, r), np.append(column, c)
+        return Dots(to_full(uv, self.factor), row, column)
+
+    def _check_size(self, name: str, image: Image) -> None:
+        camera = self.geometry.stereo.right if name.startswith("right") else self.geometry.stereo.left
+        if image.shape[:2] != (camera.height, camera.width):
+            raise ValueError(
+                f"{name} image is {image.shape[1]} × {image.shape[0]} pixels, the rig's camera {camera.width} × {camera.height}"
+            )
+
+    def _refused(self, frames: StereoFrames, watch: Stopwatch, *reasons: str) -> BladeObservation:
+        watch.lap("rest")
+        return replace(BladeObservation(frames.stamp_s, False, reasons), elapsed_ms=watch.elapsed_ms)
+
+
+def _blade_of(matches: Matches) -> Matches:
+    """The nearest surface that has enough of the dots."""
+    if len(matches) == 0:
+        return matches
+    count = np.bincount(matches.surface)
+    depth = np.array([np.median(matches.inverse_depth[matches.surface == k]) for k in range(len(count))])
+    enough = count >= max(LEAST_DOTS, SURFACE_SHARE * count.max())
+    if not enough.any():
+        return matches.take(matches.surface == 0)
+    return matches.take(matches.surface == int(np.argmax(np.where(enough, depth, 0))))
+
+
+def _station_near(dots: Array, axis: float) -> Array:
+    """The point nearest to the image centre among stations along the axis that carry dots."""
+    along = np.array([np.cos(axis), np.sin(axis)])
+    reach = dots @ along
+    return along * float(np.clip(0.0, reach.min(), reach.max()))
+
+
+def _heading(edges: tuple[Candidate, ...], axis: float) -> tuple[float | None, float | None]:
+    if not edges:
+        return None, None
+    spread = float(np.sqrt(sum(e.profile.slope_sigma[e.index] ** 2 for e in edges))) / len(edges)
+    return axis, float(np.hypot(spread, np.deg2rad(0.2 if len(edges) == 2 else 1.5)))
+
+
+def _left_first(edges: tuple[Candidate, ...], axis: float) -> list[int]:
+    if not edges:
+        return []
+    left = np.array([np.sin(axis), -np.cos(axis)])
+    return sorted(range(len(edges)), key=lambda k: -float(edges[k].outward @ left))

@@ -1,0 +1,181 @@
+"""Finds the blade's tip: a closed outline across the axis, beyond the last dots, at which the edges end too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.capture import Image
+from vision.edges import Candidate
+from vision.lines import visible_stretch
+
+Array = NDArray[np.float64]
+
+LANES = 25  # across the blade, from edge to edge
+STEP = 1.5  # px along a lane
+BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
+BOX = 5  # samples averaged on either side of a step
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The end of the blade: unit vector toward it (2,), the outermost point (2,) on the axis, a line across (outward normal
+    (2,), rho), the standard deviation along the axis; image frame, working px."""
+
+    toward: Array
+    point: Array
+    normal: Array
+    rho: float
+    sigma_px: float
+
+
+def find_tip(smooth: Image, noise: float, edges: tuple[Candidate, ...], axis: float, dots: Array) -> Outline | None:
+    """The tip, or None where the blade leaves the image. dots (n, 2): dots on the blade, image frame, working px."""
+    if not edges:
+        return None
+    for sign in (1.0, -1.0):
+        toward = sign * np.array([np.cos(axis), np.sin(axis)])
+        outline = _closed_end(smooth, noise, edges, toward, dots)
+        if outline is not None:
+            return outline
+    return None
+
+
+def _end_of(edge: Candidate, toward: Array) -> tuple[float, float]:
+    """Where along `toward` an edge is last seen, and where it would leave the image."""
+    profile, k = edge.profile, edge.index
+    direction = profile.direction[k]
+    sign = 1.0 if direction @ toward > 0 else -1.0
+    order = slice(None) if sign > 0 else slice(None, None, -1)
+    t, agrees = profile.t[k][order], profile.agrees[k][order]
+    share = np.convolve(agrees, np.ones(7) / 7, mode="same")
+    good = np.flatnonzero(share > 0.5)
+    foot = profile.normal[k] * profile.rho[k]
+    along = (foot + t[:, None] * direction) @ toward
+    return float(along[good[-1]]) if len(good) else float(along[0]), float(along[-1])
+
+
+def _closed_end(
+    smooth: Image, noise: float, edges: tuple[Candidate, ...], toward: Array, dots: Array
+) -> Outline | None:
+    height, width = smooth.shape
+    centre = np.array([(width - 1) / 2, (height - 1) / 2])
+    across = np.array([-toward[1], toward[0]])
+    last_dot = float(np.max(dots @ toward))
+    ends = [_end_of(edge, toward) for edge in edges]
+    if any(leave - last < BORDER for last, leave in ends):
+        return None
+    end = min(last for last, _ in ends)
+    low, high = _strip(edges, toward, across, dots, end)
+    wide = high - low
+    if wide < 16:
+        return None
+    start, stop = visible_stretch(across[None], np.array([(low + high) / 2]), centre - 3)
+    sign = 1.0 if np.array([-across[1], across[0]]) @ toward > 0 else -1.0
+    border = float((stop if sign > 0 else -start)[0])
+    first = min(end - 0.5 * wide, last_dot) - 3 * BOX
+    far = min(border, max(end, last_dot) + 1.6 * wide + 60)
+    if far - first < 6 * BOX:
+        return None
+    lanes = low + wide * np.linspace(0.06, 0.94, LANES)
+    s = np.arange(first, far, STEP)
+    u = (s * toward[0] + lanes[:, None] * across[0] + centre[0]).astype(np.float32)
+    v = (s * toward[1] + lanes[:, None] * across[1] + centre[1]).astype(np.float32)
+    strip = cv2.remap(smooth, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float32)
+    outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
+    where, found = _lane_ends(strip, outside, s, noise, max(end - 0.35 * wide, _quiet_after(dots, toward)))
+    if found.mean() < 0.6:
+        return None
+    return _outline(lanes, where, found, toward, across, last_dot, border, wide)
+
+
+def _quiet_after(dots: Array, toward: Array) -> float:
+    along = np.sort(dots @ toward)
+    return float(along[-min(4, len(along))]) + 5.0
+
+
+def _strip(edges: tuple[Candidate, ...], toward: Array, across: Array, dots: Array, end: float) -> tuple[float, float]:
+    """Extent of the blade across its axis at station `end`."""
+    beside = dots @ across
+    low, high = float(beside.min()) - 4, float(beside.max()) + 4
+    for edge in edges:
+        slope = edge.outward @ across
+        place = (edge.rho - end * (edge.outward @ toward)) / slope
+        if slope > 0:
+            high = place
+        else:
+            low = place
+    return low, high
+
+
+def _lane_ends(
+    strip: Array, outside: NDArray[np.bool_], s: Array, noise: float, from_s: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Where each lane (row of `strip`) steps first and clearly after `from_s`, and whether it does."""
+    sums = np.cumsum(np.pad(strip, ((0, 0), (1, 0))), axis=1)
+    before = (sums[:, BOX:-BOX] - sums[:, : -2 * BOX]) / BOX
+    after = (sums[:, 2 * BOX :] - sums[:, BOX:-BOX]) / BOX
+    size = np.abs(after - before)
+    place = s[BOX : BOX + size.shape[1]] - STEP / 2
+    size[:, place < from_s] = 0
+    size[outside[:, BOX : BOX + size.shape[1]]] = 0
+    biggest = size.max(axis=1)
+    threshold = np.maximum(0.45 * biggest, max(4.0, 2.0 * noise))
+    reached = size > threshold[:, None]
+    first = reached.argmax(axis=1)
+    found = reached.any(axis=1)
+    index = np.arange(size.shape[1])
+    near = (index >= first[:, None]) & (index <= first[:, None] + BOX)
+    peak = np.where(near, size, -1).argmax(axis=1)
+    inner = np.clip(peak, 1, size.shape[1] - 2)
+    rows = np.arange(len(size))
+    a, b, c = size[rows, inner - 1], size[rows, inner], size[rows, inner + 1]
+    bend = a - 2 * b + c
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = np.where(bend < 0, 0.5 * (a - c) / bend, 0.0)
+    return place[inner] + STEP * np.clip(shift, -1, 1), found
+
+
+def _outline(
+    lanes: Array,
+    where: Array,
+    found: NDArray[np.bool_],
+    toward: Array,
+    across: Array,
+    last_dot: float,
+    border: float,
+    wide: float,
+) -> Outline | None:
+    """A convex outline through the lanes' ends, if they make one."""
+    x = (lanes - lanes.mean()) / wide
+    median = cv2.medianBlur(where.astype(np.float32)[None], 5)[0].astype(float)
+    smooth_lane = found & (np.abs(where - median) < 0.08 * wide + 4)
+    if smooth_lane.mean() < 0.6:
+        return None
+    weight = smooth_lane.astype(float)
+    design = np.stack([np.ones_like(x), x, x * x], axis=1)
+    for _ in range(5):
+        weighted = design * weight[:, None]
+        fit = np.linalg.lstsq(weighted.T @ design + 1e-9 * np.eye(3), weighted.T @ where, rcond=None)[0]
+        residual = where - design @ fit
+        weight = smooth_lane / (1 + (residual / (0.03 * wide + 1.5)) ** 2) ** 2
+    agree = smooth_lane & (np.abs(residual) < 0.08 * wide + 4)
+    if agree.mean() < 0.6 or fit[2] > 0.5 * wide:
+        return None
+    outermost = float(np.sort(where[agree])[-min(2, int(agree.sum()))])
+    if outermost < last_dot - 4 or outermost > border - 6:
+        return None
+    middle = agree & (np.abs(x) < 0.3)
+    use = middle if middle.sum() >= 4 else agree
+    slope = float(np.polyfit(lanes[use], where[use], 1)[0]) if use.sum() >= 4 else 0.0
+    at = float(np.clip(lanes[agree][np.argmax(where[agree])], *np.quantile(lanes, (0.0, 1.0))))
+    middle_lane = float(lanes.mean())
+    normal = toward - slope * across
+    normal /= np.linalg.norm(normal)
+    top = outermost * toward + at * across
+    point = outermost * toward + middle_lane * across
+    scatter = float(np.std(residual[agree])) / np.sqrt(max(agree.sum() / 3, 1)) + 1.0
+    return Outline(toward, point, normal, float(normal @ top), scatter)
