@@ -28,7 +28,7 @@ _CONTROL = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
 )
 _INDENT_TAB = re.compile(r"^[ ]*\t\s*[^\s#]", re.MULTILINE)
-_ALLOW = re.compile(r"#\s*allow:\s*(?P<codes>[^#]*)$")
+_ALLOW = re.compile(r"#\s*allow:\s*(?P<codes>\w+(?:\s*,\s*[A-Z]\w*)*)")
 
 # The C parser is ten times faster; a build of PyYAML without libyaml still works.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -76,7 +76,7 @@ def allowances(text: str) -> dict[int, tuple[str, ...]]:
     found: dict[int, tuple[str, ...]] = {}
     for number, line in enumerate(text.splitlines(), 1):
         if "#" in line and (match := _ALLOW.search(line)):
-            found[number] = tuple(re.split(r"[,\s]+", match["codes"].strip()))
+            found[number] = tuple(re.split(r"\s*,\s*", match["codes"]))
     return found
 
 

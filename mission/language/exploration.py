@@ -1,0 +1,216 @@
+"""Everywhere a mission can get to: every leaf it can be in, on the ground or in the air, and every step between them.
+
+Guards are taken as free, retries as used up or not, and history as any place that was reached: more is explored than can
+happen, never less. Whether the vehicle flies follows from the behaviours that take it up and down.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from mission.behaviours.behaviour import Behaviour, behaviours
+from mission.executive.events import EVENTS, Event, Severity
+from mission.language.document import Mission, State, Transition, enclosing
+
+TAKES_OFF = "take_off"
+LANDS = {"land": frozenset({"landed"})}
+_BY_REQUEST = ("step", "skip")
+
+
+@dataclass(frozen=True, order=True)
+class Situation:
+    """A leaf, and whether the vehicle may be in the air on entering it."""
+
+    leaf: str
+    airborne: bool
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One step: an event that happens in a situation, what answers it, and where it leads."""
+
+    source: Situation
+    event: str
+    transition: Transition
+    target: Situation
+
+    @property
+    def automatic(self) -> bool:
+        """Whether it happens without anybody wanting it: not by the operator."""
+        event = EVENTS.get(self.event)
+        return event is None or event.raised_by != "operator"
+
+
+class Exploration:
+    """What can be reached from a mission's beginning."""
+
+    def __init__(self, mission: Mission) -> None:
+        self.mission = mission
+        self.edges: dict[Situation, tuple[Edge, ...]] = {}
+        self.came_by: dict[Situation, Edge | None] = {}
+        self._remembered: frozenset[str] = frozenset()
+        self._explore()
+
+    @property
+    def situations(self) -> tuple[Situation, ...]:
+        """In the order in which they were reached."""
+        return tuple(self.came_by)
+
+    @cached_property
+    def leaves(self) -> Mapping[str, tuple[Situation, ...]]:
+        """Leaf → its situations."""
+        found: dict[str, list[Situation]] = {}
+        for situation in self.came_by:
+            found.setdefault(situation.leaf, []).append(situation)
+        return {leaf: tuple(situations) for leaf, situations in found.items()}
+
+    def all_edges(self) -> Iterator[Edge]:
+        """Every step."""
+        for edges in self.edges.values():
+            yield from edges
+
+    def state(self, situation: Situation) -> State:
+        """The leaf's state."""
+        return self.mission.states[situation.leaf]
+
+    def flying(self, situation: Situation) -> bool:
+        """Whether the vehicle may be in the air while it is in a situation."""
+        return situation.airborne or self.state(situation).do == TAKES_OFF
+
+    def trace(self, situation: Situation) -> tuple[Edge, ...]:
+        """The shortest way there from the beginning."""
+        steps: list[Edge] = []
+        edge = self.came_by[situation]
+        while edge is not None:
+            steps.append(edge)
+            edge = self.came_by[edge.source]
+        return tuple(reversed(steps))
+
+    def reaching(self, goals: set[Situation], automatic: bool = False) -> set[Situation]:
+        """Situations from which one of the goals can be reached, the goals included."""
+        before: dict[Situation, list[Situation]] = {}
+        for edge in self.all_edges():
+            if edge.automatic or not automatic:
+                before.setdefault(edge.target, []).append(edge.source)
+        found, waiting = set(goals), deque(goals)
+        while waiting:
+            for source in before.get(waiting.popleft(), ()):
+                if source not in found:
+                    found.add(source)
+                    waiting.append(source)
+        return found
+
+    def finals(self, *outcomes: str) -> set[Situation]:
+        """Reached final situations, of these outcomes or of any."""
+        return {
+            situation
+            for situation in self.came_by
+            if (final := self.state(situation).final) is not None and (not outcomes or final in outcomes)
+        }
+
+    @cached_property
+    def retreat(self) -> frozenset[str]:
+        """Leaves on the way out: entered on abort, or after it, and from which the mission can no longer be completed."""
+        hopeful = {situation.leaf for situation in self.reaching(self.finals("completed"))}
+        entered = {edge.target for edge in self.all_edges() if edge.transition.event == "abort"}
+        waiting, found = deque(entered), set(entered)
+        while waiting:
+            for edge in self.edges.get(waiting.popleft(), ()):
+                if edge.target not in found:
+                    found.add(edge.target)
+                    waiting.append(edge.target)
+        return frozenset(situation.leaf for situation in found if situation.leaf not in hopeful)
+
+    def _explore(self) -> None:
+        """Repeated until no round finds a new place: a history leads wherever the round before has been."""
+        while True:
+            known = frozenset(situation.leaf for situation in self.came_by)
+            self._remembered = known
+            self.came_by, self.edges = {}, {}
+            self._spread(Situation(self.mission.leaf(self.mission.initial), False))
+            # An operator may skip to an entry from anywhere in the mission; it is explored last, in the air.
+            for path, state in self.mission.states.items():
+                if state.entry:
+                    self._spread(Situation(self.mission.leaf(path), True))
+            if known == {situation.leaf for situation in self.came_by}:
+                return
+
+    def _spread(self, first: Situation) -> None:
+        if first in self.came_by:
+            return
+        self.came_by[first] = None
+        waiting = deque([first])
+        while waiting:
+            situation = waiting.popleft()
+            self.edges[situation] = tuple(self._steps(situation))
+            for edge in self.edges[situation]:
+                if edge.target not in self.came_by:
+                    self.came_by[edge.target] = edge
+                    waiting.append(edge.target)
+
+    def _steps(self, situation: Situation) -> Iterator[Edge]:
+        if self.state(situation).final is not None:
+            return
+        for name, origin in happening(self.mission, situation.leaf):
+            for transition in possible(self.mission, origin, name):
+                airborne = self._airborne_after(situation, name)
+                for leaf in self._ends(transition):
+                    yield Edge(situation, name, transition, Situation(leaf, airborne))
+
+    def _airborne_after(self, situation: Situation, event: str) -> bool:
+        landed = LANDS.get(self.state(situation).do or "", frozenset())
+        return self.flying(situation) and event not in landed
+
+    def _ends(self, transition: Transition) -> Iterator[str]:
+        mission, target = self.mission, transition.target
+        first = mission.leaf(target)
+        yield first
+        if transition.history is None:
+            return
+        leaves = {leaf for leaf in self._remembered if target in enclosing(leaf)}
+        if transition.history == "shallow":
+            leaves = {mission.leaf(f"{target}.{leaf[len(target) + 1 :].split('.')[0]}") for leaf in leaves}
+        yield from sorted(leaves - {first})
+
+
+def happening(mission: Mission, leaf: str) -> Iterator[tuple[str, str]]:
+    """Everything that can happen in a leaf: (event, the state that it is about)."""
+    state = mission.states[leaf]
+    behaviour = behaviour_of(state)
+    for event in EVENTS.values():
+        if event.name in ("timed_out", *_BY_REQUEST) or (event.name in _ABOUT_BEHAVIOURS and behaviour is None):
+            continue
+        if event.name == "failed" and (behaviour is None or "failed" not in behaviour.outcomes):
+            continue
+        yield event.name, leaf
+    for outer in enclosing(leaf):
+        if mission.states[outer].timeout_s is not None:
+            yield "timed_out", outer
+    if behaviour is not None:
+        for outcome in behaviour.outcomes:
+            if outcome not in EVENTS:
+                yield outcome, leaf
+
+
+_ABOUT_BEHAVIOURS = ("behaviour_failed", "behaviour_stuck")
+
+
+def possible(mission: Mission, origin: str, event: str) -> Iterator[Transition]:
+    """Transitions that may answer an event: up to the first that always does, as guards and retries can pass it on."""
+    for transition in mission.handlers(origin, event):
+        yield transition
+        if not transition.guarded and transition.retries is None:
+            return
+
+
+def behaviour_of(state: State) -> Behaviour | None:
+    """What a state does."""
+    return behaviours().get(state.do) if state.do else None
+
+
+def safety_events() -> tuple[Event, ...]:
+    """Events of the table that are about safety: those that must not go unheard in the air."""
+    return tuple(event for event in EVENTS.values() if event.severity in (Severity.SAFETY, Severity.CRITICAL))
