@@ -25,6 +25,7 @@ DISTRUST_S = 20.0  # seconds without it until the survey's is back: longer than 
 TRUSTED_SIGMA_M = 0.3  # a distance less certain than this opens nothing
 TRUSTED_AGE_S = 1.0
 LOCAL_M = 5.0  # the measured surface holds this far along the blade and fades out over as much again
+ROOT_SIGMA_M = 0.5  # of the hub beside a measured root: only its place along the blade is still the survey's
 BEND_PER_M = 0.05  # how much a blade may leave its tangent, metres a metre
 TIP_HALF_DEPTH_M = 0.3  # half of what a twisted tip takes up from front to back
 
@@ -107,7 +108,8 @@ class KeepOut:
         if not certain:
             if old is None:
                 return self
-            return replace(self, surface=replace(old, trust=max(0.0, old.trust - elapsed_s / DISTRUST_S)))
+            faded = old.trust - elapsed_s / DISTRUST_S
+            return replace(self, surface=replace(old, trust=faded) if faded > 0 else None)
         edges = [side.offset_m for side in (estimate.leading, estimate.trailing) if side is not None]
         at_axis = float(self.turbine.blade_frame().to_blade(estimate.point)[1])
         front = min([0.0, *(estimate.across_slope * (offset - at_axis) for offset in edges)])
@@ -125,6 +127,10 @@ class KeepOut:
     def _solids(self) -> tuple[Solid, ...]:
         t = self.turbine
         grown = self.clearance_m + self.sigmas * t.hub_sigma_m
+        root = self._root_share()
+        hub = t.hub + root * self._hub_depth() * t.blade_frame().depth
+        known = min(t.hub_sigma_m, ROOT_SIGMA_M)
+        grown_hub = self.clearance_m + self.sigmas * (root * known + (1.0 - root) * t.hub_sigma_m)
         x, _, z = t.axes()
         hub_radius = max(t.root_diameter_m, t.root_radius_m + 0.5)
         tower_axis = t.hub + t.overhang_m * x
@@ -133,9 +139,9 @@ class KeepOut:
         nacelle = np.array([t.nacelle_length_m / 2, t.nacelle_width_m / 2, t.nacelle_width_m / 2])
         return (
             Revolved(t.hub, t.rotor_rotation[:, 0], self._rotor_profile(), self.clearance_m),
-            Ball(t.hub + self._hub_shift() * x, hub_radius + grown),
+            Ball(hub, hub_radius + grown_hub),
             Revolved(tower_axis, z, tower, grown),
-            Box(t.hub + t.nacelle_length_m / 2 * x, t.rotation, nacelle, grown),
+            Box(hub + t.nacelle_length_m / 2 * x, t.rotation, nacelle, grown_hub),
         )
 
     def _rotor_profile(self) -> tuple[tuple[float, float], ...]:
@@ -170,13 +176,18 @@ class KeepOut:
             return measured
         return share * measured + (1.0 - share) * survey
 
-    def _hub_shift(self) -> float:
-        """How far the measured blade, extended to the hub, puts the hub behind the survey; 0 away from the root."""
+    def _root_share(self) -> float:
+        """How far the measured surface speaks for the hub: 1 beside the root and trusted, 0 away from it."""
+        if self.surface is None:
+            return 0.0
+        return self.surface.trust * float(np.clip(2.0 - self.surface.station_m / LOCAL_M, 0.0, 1.0))
+
+    def _hub_depth(self) -> float:
+        """Where the measured blade, extended to the hub, puts the hub's centre along the depth axis of the survey."""
         surface = self.surface
         if surface is None:
             return 0.0
-        share = surface.trust * float(np.clip(2.0 - surface.station_m / LOCAL_M, 0.0, 1.0))
-        return share * (surface.depth_m - surface.slope * surface.station_m + self._half_depth(surface.station_m))
+        return surface.depth_m - surface.slope * surface.station_m + self._half_depth(surface.station_m)
 
     def _half_depth(self, station: float) -> float:
         t = self.turbine

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 Side = Literal["leading", "trailing"]
 Mode = Literal["both", "one", "wrong_side", "none"]
 
-STANDOFF_PID = Pid(p=1.3, i=0.12, limit=1.5, integral_limit=0.4)
+STANDOFF_PID = Pid(p=1.6, i=0.15, d=0.3, limit=1.5, integral_limit=0.4)
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,9 @@ def follow(estimate: BladeEstimate, pose: VehiclePose, settings: FollowSettings,
     speed = state.speed_m_s + float(np.clip(wanted_speed - state.speed_m_s, -2 * step, step))
 
     standoff_error = estimate.nearest_m - settings.standoff_m
-    approach, standoff_state = settings.standoff.step(standoff_error, elapsed, state.standoff)
+    approach, standoff_state = settings.standoff.step(
+        standoff_error, elapsed, state.standoff, error_rate=float(pose.velocity @ normal)
+    )
     target = (
         pose.position
         + speed / settings.position_gain * along
@@ -189,13 +191,20 @@ def _aim(estimate: BladeEstimate, settings: FollowSettings, station: float, offs
         half = sign * (edge - other.offset_m - other.slope * away) / 2
         if half <= room:
             mode, inset, inset_slope = "both", max(half, 0.0), sign * (wanted.slope - other.slope) / 2
-    if sign * (offset - edge) > 0:
+    if _beyond(wanted) or sign * (offset - edge) > 0:
         mode = "wrong_side"
     return _Aim(edge - sign * inset, wanted.slope - sign * inset_slope, mode)
 
 
 def _usable(side: SideEstimate | None, settings: FollowSettings) -> bool:
     return side is not None and side.age_s <= settings.edge_bridge_s
+
+
+def _beyond(side: SideEstimate) -> bool:
+    """Whether the optical axis passes the edge on its far side, over the background."""
+    if side.line is None or side.outward is None:
+        return False
+    return float(side.outward @ (np.cos(side.line.theta), np.sin(side.line.theta))) < 0
 
 
 def _inset(settings: FollowSettings, estimate: BladeEstimate, normal: Array) -> float:
@@ -243,7 +252,6 @@ def _heading_image(estimate: BladeEstimate, settings: FollowSettings, mode: Mode
         return heading_on_both((ahead[0], ahead[1]), reverse)
     along = estimate.heading + (np.pi if reverse else 0.0)
     theta, rho = wanted.line.theta, wanted.line.rho
-    beyond = wanted.outward is not None and float(wanted.outward @ (np.cos(theta), np.sin(theta))) < 0
-    if beyond:
+    if _beyond(wanted):
         return heading_on_wrong_side(settings.view, theta, rho, settings.k, turn_of(theta + np.pi, along))
     return heading_on_one(settings.view, theta, rho, settings.k, turn_of(theta, along))

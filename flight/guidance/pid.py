@@ -27,13 +27,20 @@ class Pid:
     integral_limit: float = inf
     rate: float = inf
 
-    def step(self, error: float, elapsed_s: float, state: PidState) -> tuple[float, PidState]:
-        """The output for this error, `elapsed_s` after the last, and the state to pass next time."""
-        change = 0.0 if state.error is None or elapsed_s <= 0 else (error - state.error) / elapsed_s
+    def step(
+        self, error: float, elapsed_s: float, state: PidState, error_rate: float | None = None
+    ) -> tuple[float, PidState]:
+        """The output for this error, `elapsed_s` after the last, and the state to pass next time.
+
+        error_rate: the error's change a second where it is measured; without, the difference to the last error serves.
+        """
+        change = error_rate
+        if change is None:
+            change = 0.0 if state.error is None or elapsed_s <= 0 else (error - state.error) / elapsed_s
         integral = _clip(state.integral + self.i * error * elapsed_s, self.integral_limit)
         wanted = self.p * error + integral + self.d * change
         output = _clip(wanted, self.limit)
-        if state.output is not None:
+        if state.output is not None and self.rate < inf:
             output = state.output + _clip(output - state.output, self.rate * elapsed_s)
         if (wanted - output) * error > 0:
             integral = state.integral
