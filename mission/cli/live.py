@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Protocol
 
-from mission.record.follower import JournalFollower
 from mission.cli.scene import Scene, VisionRate, take_scene
+from mission.record.follower import JournalFollower
 
 if TYPE_CHECKING:
     from mission.executive.executive import Executive
