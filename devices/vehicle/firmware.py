@@ -63,6 +63,7 @@ class Firmware:
         self._battery, self._gimbal = battery, gimbal
         self._note, self._say = note, say
         self.flight = Flight(estimate, parameters, Sticks(), Target())
+        self.target = Target()
         self.time_s = 0.0
         self.armed = False
         self.landed = True
@@ -217,7 +218,7 @@ class Firmware:
             return None
         self._watch_offboard()
         self._watch_battery()
-        target = self._flying.target(self.flight, seconds)
+        target = self.target = self._flying.target(self.flight, seconds)
         if self._flying.done:
             self._enter_next()
         if self._watch_ground(target, seconds):
