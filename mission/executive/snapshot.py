@@ -27,8 +27,8 @@ class Snapshot:
     needs_vision: the running behaviour cannot work without images. streaming: setpoints are being sent. vision_age_s:
     since the last accepted observation, or since the watch began; None while nobody watches. seen: something has been
     accepted since then. standoff_m: the distance to the blade that the running behaviour keeps. was_ours: since
-    take-off the autopilot has flown in a mode that no pilot chose. laser_fault: the rig's own complaint. home: where the
-    flight began, local NED. side: whose frames are being recorded.
+    take-off the autopilot has flown in a mode that no pilot chose. laser_fault: the rig's own complaint. home: where
+    the flight began, local NED. side: whose frames are being recorded.
     """
 
     now: float

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Awaitable, Callable, Generator
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from mission.behaviours.behaviour import Behaviour
 from mission.executive.gate import Gate
@@ -18,6 +19,36 @@ _SLICE_S = 0.05
 _REST_S = 0.5
 
 
+class Leash:
+    """Drives a coroutine as `await` does, until it is cut: then it is not resumed any more, whatever it wants."""
+
+    _unwilling: ClassVar[list[Any]] = []  # those that would not even close: kept, so that nobody tries again
+
+    def __init__(self, run: Callable[[], Awaitable[str]]) -> None:
+        self.cut = False
+        self._awaited = run
+
+    def __await__(self) -> Generator[Any, Any, str]:
+        inner: Any = self._awaited().__await__()
+        resume: Callable[[], Any] = partial(next, inner)
+        while True:
+            try:
+                waited_for = resume()
+            except StopIteration as stop:
+                return cast(str, stop.value)
+            try:
+                yield waited_for
+                resume = partial(next, inner)
+            except BaseException as error:
+                if self.cut:
+                    try:
+                        inner.close()
+                    except RuntimeError:
+                        self._unwilling.append(inner)
+                    raise
+                resume = partial(inner.throw, error)
+
+
 class Work:
     """Runs one behaviour at a time. `activation` counts them; `ended(activation, event, data)` hears how each ended."""
 
@@ -25,7 +56,7 @@ class Work:
         self._services, self._gate, self._ended = services, gate, ended
         self._task: asyncio.Task[None] | None = None
         self._stopping = False
-        self._abandoned: set[asyncio.Task[None]] = set()
+        self._leash: Leash | None = None
         self._failed_s = float("-inf")
         self.activation = 0
         self.behaviour: Behaviour | None = None
@@ -42,8 +73,9 @@ class Work:
         self._stopping = False
         self.behaviour = behaviour
         given = behaviour.parameters() if parameters is None else parameters
+        self._leash = Leash(partial(behaviour.run, self._services, given))
         self._task = asyncio.get_running_loop().create_task(
-            self._run(self.activation, behaviour, given), name=f"behaviour {behaviour.name}"
+            self._run(self.activation, behaviour, self._leash), name=f"behaviour {behaviour.name}"
         )
 
     async def stop(self, meanwhile: Callable[[], None]) -> bool:
@@ -67,19 +99,19 @@ class Work:
         if task.done():
             return True
         self._gate.revoke(ended)
-        self._abandoned.add(task)
-        task.add_done_callback(self._abandoned.discard)
+        assert self._leash is not None
+        self._leash.cut = True
         task.cancel()
         self._services.log.error(
             "behaviour ignores cancellation and is abandoned", behaviour=behaviour and behaviour.name
         )
         return False
 
-    async def _run(self, activation: int, behaviour: Behaviour, parameters: Parameters) -> None:
+    async def _run(self, activation: int, behaviour: Behaviour, leash: Leash) -> None:
         self._gate.enter(activation)
         log = self._services.log
         try:
-            outcome = await behaviour.run(self._services, parameters)
+            outcome = await leash
         except asyncio.CancelledError as cancelled:
             if not self._stopping and activation == self.activation:
                 self._fail(activation, behaviour, str(cancelled) or "was cancelled from within")
