@@ -29,7 +29,7 @@ _COMPONENT = (1, 195)
 class LockstepAutopilot:
     """`LockstepAutopilot(vehicle)`; hand its `advance` to the LockstepLoop.
 
-    `start_s` is the executive's clock at the vehicle's boot. `link_up` False cuts the link: nothing arrives on either
+    `start_s` is the executive's clock at the vehicle's boot. `up` False cuts the link: nothing arrives on either
     side.
     """
 
@@ -37,7 +37,7 @@ class LockstepAutopilot:
 
     def __init__(self, vehicle: SimulatedVehicle, truth_log: TruthLog | None = None, start_s: float = 0.0) -> None:
         self.vehicle = vehicle
-        self.link_up = True
+        self.up = True
         self.before_step: Callable[[float], None] = lambda now_s: None
         self._log = truth_log
         self._start_s = start_s
@@ -59,7 +59,7 @@ class LockstepAutopilot:
             self.vehicle.step(POSE_PERIOD_S)
             if self._log is not None:
                 self._log.update()
-            if self.link_up:
+            if self.up:
                 self._listen()
 
     async def connect(self, timeout_s: float) -> None:
@@ -165,7 +165,7 @@ class LockstepAutopilot:
 
     @property
     def _reaches(self) -> bool:
-        return self._connected and self.link_up
+        return self._connected and self.up
 
     async def _until(self, condition: Callable[[], bool], timeout_s: float, complaint: str) -> None:
         waited = 0.0

@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import asyncio
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from mission.executive.belief import located, surveyed_turbine
+from mission.executive.signals import interrupting
+from mission.executive.simulation import Rehearsal
+from mission.executive.stage import FlightError, Stage, lockstep_stage, wall_stage
 
 if TYPE_CHECKING:
-    from mission.executive.executive import Executive
+    from flight.turbine import Turbine
+    from mission.executive.executive import Ask, Executive, Question
+    from mission.executive.journal import Journal
     from mission.language.document import Mission
     from mission.record.folder import RunFolder
+    from mission.record.recorder import RunRecorder
+
+__all__ = ["FlightError", "FlightOptions", "FlightResult", "fly"]
+
+CONNECT_S = 20.0
+SIMULATED_LATENCY_S = 0.06  # of capture and vision, in lockstep time, where computing takes no time at all
 
 
 @dataclass(frozen=True)
 class FlightOptions:
     """What `mission run` was asked to do, checked and typed.
 
-    speed: None for the rig file's. system: None for the rig file's. confirm: asked before a real vehicle is armed and, with
-    autonomy below full, before marked transitions. on_start: called with the executive once it exists (for the live view).
-    resume: the folder of an interrupted run to go on with.
+    speed, system: None for the rig file's. confirm: asked before a real vehicle is armed and, with autonomy below full,
+    before marked transitions. on_start: called with the executive once it exists (for the live view). resume: the folder
+    of an interrupted run to go on with.
     """
 
     mission: Mission
@@ -42,10 +57,6 @@ class FlightResult:
     interrupted: bool
 
 
-class FlightError(RuntimeError):
-    """The flight could not begin; one line for a person."""
-
-
 def fly(options: FlightOptions) -> FlightResult:
     """Fly a mission and write its record (everything except summary and report) into the run's folder.
 
@@ -54,4 +65,125 @@ def fly(options: FlightOptions) -> FlightResult:
     Raises:
         FlightError: nothing was flown (no connection, port in use, rig not there), one line with the remedy.
     """
-    raise NotImplementedError
+    from mission.record.run_log import RunLog
+
+    log = RunLog(options.folder.log)
+    try:
+        with lockstep_stage(options) if options.lockstep else wall_stage(options) as stage:
+            if stage.world is not None:
+                _ = stage.world.renderer  # drawn for the first time before anything flies
+            with asyncio.Runner(loop_factory=stage.loop_factory) as runner:
+                return runner.run(_fly(options, stage, log.logger))
+    finally:
+        log.close()
+
+
+async def _fly(options: FlightOptions, stage: Stage, log: Any) -> FlightResult:
+    """Connect, fly, and close everything that was opened, whatever happens."""
+    from flight.autopilot import AutopilotError
+    from mission.executive.journal import Journal
+    from mission.record.recorder import RunRecorder
+
+    recorder = journal = None
+    tasks: list[asyncio.Task[None]] = []
+    try:
+        try:
+            await stage.autopilot.connect(CONNECT_S)
+        except AutopilotError as error:
+            raise FlightError(str(error)) from error
+        if not stage.autopilot.simulated and not options.confirm(f"Arm and fly {options.mission.name} for real?"):
+            return FlightResult("refused", options.mission.initial, False)
+        journal = Journal(options.folder.journal, threaded=not options.lockstep)
+        recorder = RunRecorder(options.folder, stage.rig.geometry.stereo.left, log, inline=options.lockstep)
+        executive, running = _compose(options, stage, journal, recorder, log)
+        loop = asyncio.get_running_loop()
+        tasks = [loop.create_task(work, name=name) for name, work in running.items()]
+        options.on_start(executive)
+        with interrupting(executive):
+            outcome = await executive.run()
+        return FlightResult(outcome.outcome, outcome.final_state, outcome.interrupted)
+    finally:
+        for task in tasks:
+            task.cancel()
+        with suppress(asyncio.CancelledError):
+            await asyncio.gather(*tasks, return_exceptions=True)
+        await stage.autopilot.close()
+        if recorder is not None:
+            recorder.close()
+        if journal is not None:
+            journal.close()
+
+
+def _compose(
+    options: FlightOptions, stage: Stage, journal: Journal, recorder: RunRecorder, log: Any
+) -> tuple[Executive, dict[str, Coroutine[Any, Any, None]]]:
+    """The executive with its services, and what has to run beside it, by name."""
+    from vision.far_view import find_rotor
+
+    from flight.keepout import KeepOut
+    from flight.setpoints import SetpointStream
+    from mission.executive.executive import Executive
+    from mission.executive.perception import VisionLoop
+    from mission.executive.services import Services
+    from vision.pipeline import Eye
+    from vision.tracker import BladeTracker
+
+    mission = options.mission
+    camera = stage.rig.geometry.stereo.left
+    turbine = surveyed_turbine(mission)
+    setpoints = SetpointStream(
+        stage.autopilot,
+        stage.clock,
+        KeepOut(turbine, mission.limits.clearance_m),
+        on_sent=recorder.sent,
+        on_event=lambda name: executive.raise_event(name),
+    )
+    perception = VisionLoop(
+        rig=stage.rig,
+        eye=Eye(stage.rig.geometry),
+        find_rotor=lambda image: find_rotor(image, camera),
+        tracker=lambda frame: BladeTracker(frame, camera),
+        frame=turbine.blade_frame(),
+        autopilot=stage.autopilot,
+        clock=stage.clock,
+        mount=mission.rig.mount_m,
+        sink=recorder,
+        latency_s=SIMULATED_LATENCY_S if options.lockstep else 0.0,
+    )
+
+    def refined(turbine: Turbine) -> None:
+        perception.use_frame(turbine.blade_frame())
+        assert setpoints.keep_out is not None
+        setpoints.keep_out = setpoints.keep_out.with_turbine(turbine)
+
+    services = Services(
+        clock=stage.clock,
+        autopilot=stage.autopilot,
+        setpoints=setpoints,
+        perception=perception,
+        turbine=turbine,
+        mission=mission,
+        raise_event=lambda name, **data: executive.raise_event(name, **data),
+        log=log,
+        rig=stage.rig,
+        locate=lambda sights: located(services.turbine, camera, sights),
+        on_turbine_refined=refined,
+    )
+    executive = Executive(mission, services, stage.clock, journal, ask=_asking(options), autonomy=options.autonomy)
+    beside: dict[str, Coroutine[Any, Any, None]] = {
+        "vision": perception.run(),
+        "telemetry": recorder.follow(stage.clock, stage.autopilot, setpoints),
+    }
+    if stage.world is not None:
+        rehearsal = Rehearsal(stage.world, stage.switch, lambda: executive.state)
+        beside["faults"] = rehearsal.run(stage.clock)
+    return executive, beside
+
+
+def _asking(options: FlightOptions) -> Ask:
+    """Ask on the terminal, in a thread: the flight goes on meanwhile."""
+
+    async def ask(question: Question) -> bool:
+        return await asyncio.to_thread(options.confirm, question.text)
+
+    return ask

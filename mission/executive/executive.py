@@ -185,6 +185,11 @@ class Executive:
         """Whether the event would lead anywhere now."""
         return self._machine.choose(name, self._quantities()) is not None
 
+    @property
+    def state(self) -> str:
+        """Path of the active leaf."""
+        return self._machine.state
+
     def status(self) -> Status:
         """One glance at the run."""
         now, active = self._clock.now(), self._machine.configuration.active

@@ -100,6 +100,11 @@ class VisionLoop:
         return self._watching
 
     @property
+    def side(self) -> str | None:
+        """Whose frames are being recorded."""
+        return self._side
+
+    @property
     def vision_age_s(self) -> float | None:
         """Since the last accepted observation, or since the watch began; None while nobody watches."""
         if not self._watching or self.watching_since_s is None:

@@ -1,0 +1,176 @@
+"""Where a flight takes place: clock, autopilot, rig and, in simulation, the true world, set up and taken down again."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mission.executive.belief import rig_geometry
+from mission.executive.clock import LockstepClock, LockstepLoop, WallClock
+from mission.executive.simulation import Switch, build_world
+
+if TYPE_CHECKING:
+    from devices.rig import Rig
+    from devices.vehicle.spawn import VehicleProcess
+    from devices.world.world import World
+    from flight.autopilot import Autopilot
+    from mission.executive.assembly import FlightOptions
+    from mission.executive.clock import Clock
+    from vision.camera import RigGeometry
+
+
+class FlightError(RuntimeError):
+    """The flight could not begin; one line for a person."""
+
+
+@dataclass
+class Stage:
+    """One flight's surroundings. world: None without a simulated one. switch: faults of the simulated vehicle."""
+
+    loop_factory: Callable[[], asyncio.AbstractEventLoop]
+    clock: Clock
+    autopilot: Autopilot
+    rig: Rig
+    world: World | None = None
+    switch: Switch | None = None
+
+
+@contextmanager
+def lockstep_stage(options: FlightOptions) -> Iterator[Stage]:
+    """Everything in this process, and time that advances only as fast as it is computed."""
+    from devices.simulated_rig import SimulatedRig
+    from devices.vehicle.fault_switches import FaultSwitches
+    from devices.vehicle.settings import VehicleSettings
+    from devices.vehicle.truth_log import TruthLog
+    from devices.vehicle.vehicle import SimulatedVehicle
+    from devices.world.world import TruePose
+    from flight.lockstep_link import LockstepAutopilot
+
+    mission = options.mission
+    world = build_world(mission)
+    vehicle = SimulatedVehicle(VehicleSettings.of_world(world.settings), world.settings.seed, world.forward_range)
+    autopilot = LockstepAutopilot(vehicle, TruthLog(options.folder.telemetry, vehicle, wall=False))
+    clock = LockstepClock()
+
+    def true_pose() -> TruePose:
+        truth = vehicle.pose()
+        return TruePose(truth.position, truth.attitude, truth.gimbal, truth.velocity)
+
+    rig = SimulatedRig(world, _geometry(options), np.array(mission.rig.mount_m), true_pose, clock.now)
+    switches = FaultSwitches(vehicle, [autopilot])
+
+    def switch(name: str, **arguments: object) -> None:
+        switches.run(name, arguments)
+
+    yield Stage(lambda: LockstepLoop(autopilot.advance), clock, autopilot, rig, world, switch)
+
+
+@contextmanager
+def wall_stage(options: FlightOptions) -> Iterator[Stage]:
+    """A vehicle behind a socket, ours or another, and wall time, scaled where the vehicle's time is."""
+    from flight.mavsdk_link import MavsdkAutopilot
+
+    mission = options.mission
+    rig_file = mission.rig
+    system = options.system or rig_file.system
+    speed = options.speed or rig_file.speed
+    with ExitStack() as stack:
+        vehicle = None
+        world = build_world(mission) if rig_file.kind in ("simulated", "px4_sitl") else None
+        if system == "embedded":
+            vehicle = _spawn(options, speed)
+            stack.callback(vehicle.stop)
+            system = vehicle.system_address
+        clock = WallClock(speed)
+        stack.callback(clock.close)
+        autopilot = MavsdkAutopilot(
+            system,
+            clock,
+            simulated=world is not None,
+            gimbal="in_process" if rig_file.gimbal == "in_process" else "autopilot",
+        )
+        rig, switch = _rig(options, stack, world, vehicle, clock, autopilot)
+        stack.callback(rig.close)
+        yield Stage(asyncio.new_event_loop, clock, autopilot, rig, world, switch)
+
+
+def _geometry(options: FlightOptions) -> RigGeometry:
+    try:
+        return rig_geometry(options.mission.rig, options.mission.path.parent)
+    except (OSError, ValueError) as error:
+        raise FlightError(str(error)) from error
+
+
+def _spawn(options: FlightOptions, speed: float) -> VehicleProcess:
+    from devices.vehicle.settings import LinkSettings, ProcessSettings, VehicleSettings
+    from devices.vehicle.spawn import SpawnError, spawn
+    from devices.world.settings import WorldSettings
+
+    mission = options.mission
+    settings = mission.world or WorldSettings()
+    try:
+        return spawn(
+            ProcessSettings(
+                vehicle=VehicleSettings.of_world(settings),
+                seed=settings.seed,
+                speed=speed,
+                links=(LinkSettings(),),
+                folder=options.folder.telemetry.resolve(),
+                watch_parent=True,
+                world={
+                    "turbine": mission.turbine.model_dump(),
+                    "site": mission.site.model_dump(),
+                    "settings": settings.model_dump(),
+                },
+            )
+        )
+    except SpawnError as error:
+        raise FlightError(str(error)) from error
+
+
+def _rig(
+    options: FlightOptions,
+    stack: ExitStack,
+    world: World | None,
+    vehicle: VehicleProcess | None,
+    clock: WallClock,
+    autopilot: Autopilot,
+) -> tuple[Rig, Switch | None]:
+    """The rig that the mission's rig file asks for, and the switches of the vehicle where it is ours."""
+    from devices.simulated_rig import SimulatedRig
+    from devices.world.world import TruePose
+
+    mission = options.mission
+    mount = np.array(mission.rig.mount_m)
+    if vehicle is not None and world is not None:
+        from devices.vehicle.truth_channel import TruthClient
+
+        client = TruthClient(vehicle.truth_port)
+        stack.callback(client.close)
+
+        def true_pose() -> TruePose:
+            truth = client.pose()
+            return TruePose(truth.position, truth.attitude, truth.gimbal, truth.velocity)
+
+        return SimulatedRig(world, _geometry(options), mount, true_pose, clock.now), client.command
+    if world is not None:
+
+        def reported_pose() -> TruePose:
+            pose = autopilot.telemetry.pose
+            return TruePose(pose.position, pose.attitude, pose.gimbal, pose.velocity, pose.stamp_s)
+
+        return SimulatedRig(world, _geometry(options), mount, reported_pose, clock.now), None
+    if mission.rig.kind == "recorded":
+        from devices.recorded_rig import RecordedRig
+
+        folder = mission.path.parent / str(mission.rig.frames)
+        return RecordedRig(folder, _geometry(options), clock.now), None
+    raise FlightError(
+        f"rig kind {mission.rig.kind!r}: no camera driver is installed for it; write one beside devices/rig.py "
+        "and choose it in mission/executive/stage.py"
+    )
