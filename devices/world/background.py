@@ -78,14 +78,29 @@ def _fields(random: np.random.Generator) -> NDArray[np.float64]:
 
 
 @compiled
-def _draw(image: Any, rotation: Any, position: Any, lens: Any, exposure: float, height: float, tiles: Any) -> None:
+def _draw(
+    image: Any, rotation: Any, position: Any, lens: Any, exposure: float, height: float, tiles: Any, seen: Any
+) -> None:
     ground, clouds, haze, zenith, white = tiles
     rows, columns = image.shape[:2]
     fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
     mask = TILE - 1
+    step = max(seen.shape[0] // (2 * rows - 1), 1)
+    last_row, last_column = seen.shape[0] - 1, seen.shape[1] - 1
     for v in range(rows):
         rz = (v - cy) / fy
+        above, below = max((2 * v - 1) * step, 0), min((2 * v + 3) * step - 1, last_row)
         for u in range(columns):
+            left, right = max((2 * u - 1) * step, 0), min((2 * u + 3) * step - 1, last_column)
+            if (
+                seen[above, left] >= 0
+                and seen[above, right] >= 0
+                and seen[below, left] >= 0
+                and seen[below, right] >= 0
+            ):
+                for c in range(3):
+                    image[v, u, c] = 128
+                continue
             ry = (u - cx) / fx
             north = rotation[0, 0] + rotation[0, 1] * ry + rotation[0, 2] * rz
             east = rotation[1, 0] + rotation[1, 1] * ry + rotation[1, 2] * rz
@@ -136,18 +151,20 @@ def background(
     rotation: NDArray[np.float64],
     position: NDArray[np.float64],
     ground_down_m: float,
-    exposure: float = 1.0,
+    exposure: float,
+    seen: NDArray[np.int32],
 ) -> NDArray[np.uint8]:
     """An image (height, width, 3) BGR of size (width, height) seen from a pose in local NED, the ground at
     `ground_down_m`.
 
-    Drawn at half the resolution, for what is far is out of focus. lens: fx, fy, cx, cy.
+    Drawn at half the resolution, for what is far is out of focus. lens: fx, fy, cx, cy. seen:
+    of `raster.visibility`; what the turbine hides is left grey.
     """
     width, height = size
     half = np.empty(((height + 1) // 2, (width + 1) // 2, 3), np.uint8)
     coarse = np.array([lens[0] / 2, lens[1] / 2, (lens[2] + 0.5) / 2 - 0.5, (lens[3] + 0.5) / 2 - 0.5])
     above = max(float(ground_down_m - position[2]), 0.5)
-    _draw(half, rotation, position, coarse, exposure, above, (tiles.ground, tiles.clouds, HAZE, ZENITH, CLOUD))
+    _draw(half, rotation, position, coarse, exposure, above, (tiles.ground, tiles.clouds, HAZE, ZENITH, CLOUD), seen)
     full = cv2.resize(half, (half.shape[1] * 2, half.shape[0] * 2), interpolation=cv2.INTER_LINEAR)
     image: NDArray[np.uint8] = np.ascontiguousarray(full[:height, :width], np.uint8)
     return image

@@ -105,47 +105,73 @@ def visibility(points: Any, triangles: Any, start: Any, clusters: Any, lens: Any
                     continue
                 begin, end = max(int(np.ceil(low)), 0), min(int(np.ceil(high)), width)
                 value = constant + v * nz / fy / facing
+                depths, owners = inverse[v], seen[v]
                 for u in range(begin, end):
-                    depth = value + u * slope
-                    if depth > inverse[v, u]:
-                        inverse[v, u] = depth
-                        seen[v, u] = t
+                    depth = np.float32(value + u * slope)
+                    if depth > depths[u]:
+                        depths[u] = depth
+                        owners[u] = t
 
 
 @compiled
-def _planes(t: int, points: Any, triangles: Any, attributes: Any, lens: Any, planes: Any) -> None:
-    """planes (k + 1, 3): coefficients in (u, v, 1) of 1/depth and of each attribute over depth, for triangle t."""
-    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+def _plane(w: Any, f: Any, au: Any, av: Any, bu: Any, bv: Any, eu: Any, ev: Any, scale: Any) -> Any:
+    """Coefficients in (u, v, 1) of f / depth, for values f at the corners and their 1/depth w."""
+    fa, fb, fe = f[0] * w[0], f[1] * w[1], f[2] * w[2]
+    du = ((fb - fa) * (ev - av) - (fe - fa) * (bv - av)) * scale
+    dv = ((fe - fa) * (bu - au) - (fb - fa) * (eu - au)) * scale
+    return du, dv, fa - du * au - dv * av
+
+
+@compiled
+def _planes(t: int, points: Any, triangles: Any, attributes: Any, lens: Any) -> Any:
+    """Planes in the image of 1/depth and of the three attributes over depth, for triangle t: four times three
+    numbers."""
     i, j, m = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    wa, wb, we = 1 / points[i, 0], 1 / points[j, 0], 1 / points[m, 0]
-    au, av = fx * points[i, 1] * wa + cx, fy * points[i, 2] * wa + cy
-    bu, bv = fx * points[j, 1] * wb + cx, fy * points[j, 2] * wb + cy
-    eu, ev = fx * points[m, 1] * we + cx, fy * points[m, 2] * we + cy
+    w = (1 / points[i, 0], 1 / points[j, 0], 1 / points[m, 0])
+    au, av = lens[0] * points[i, 1] * w[0] + lens[2], lens[1] * points[i, 2] * w[0] + lens[3]
+    bu, bv = lens[0] * points[j, 1] * w[1] + lens[2], lens[1] * points[j, 2] * w[1] + lens[3]
+    eu, ev = lens[0] * points[m, 1] * w[2] + lens[2], lens[1] * points[m, 2] * w[2] + lens[3]
     area = (bu - au) * (ev - av) - (bv - av) * (eu - au)
     scale = 1 / area if area != 0 else 0.0
-    for k in range(planes.shape[0]):
-        if k == 0:
-            fa, fb, fe = wa, wb, we
-        else:
-            fa, fb, fe = attributes[i, k - 1] * wa, attributes[j, k - 1] * wb, attributes[m, k - 1] * we
-        du = ((fb - fa) * (ev - av) - (fe - fa) * (bv - av)) * scale
-        dv = ((fe - fa) * (bu - au) - (fb - fa) * (eu - au)) * scale
-        planes[k, 0], planes[k, 1], planes[k, 2] = du, dv, fa - du * au - dv * av
+    one = (1.0, 1.0, 1.0)
+    a = (attributes[i, 0], attributes[j, 0], attributes[m, 0])
+    b = (attributes[i, 1], attributes[j, 1], attributes[m, 1])
+    c = (attributes[i, 2], attributes[j, 2], attributes[m, 2])
+    return (
+        _plane(w, one, au, av, bu, bv, eu, ev, scale),
+        _plane(w, a, au, av, bu, bv, eu, ev, scale),
+        _plane(w, b, au, av, bu, bv, eu, ev, scale),
+        _plane(w, c, au, av, bu, bv, eu, ev, scale),
+    )
 
 
 @compiled
-def _colour(planes: Any, u: float, v: float, part: int, skins: Any, layout: Any, tint: Any, colour: Any) -> None:
-    """colour (3,) BGR of the surface at (u, v): shade × paint × dirt of its skin."""
-    depth = 1 / (planes[0, 0] * u + planes[0, 1] * v + planes[0, 2])
-    shade = (planes[1, 0] * u + planes[1, 1] * v + planes[1, 2]) * depth
-    along = (planes[2, 0] * u + planes[2, 1] * v + planes[2, 2]) * depth
-    around = (planes[3, 0] * u + planes[3, 1] * v + planes[3, 2]) * depth
-    offset, rows, columns, scale = layout[part, 0], layout[part, 1], layout[part, 2], layout[part, 3]
-    row = int(max(along, 0.0) * scale) % rows
+def _surface(planes: Any, u: Any, v: Any, place: Any, skins: Any) -> Any:
+    """Shade and dirt, both 0 to 1, of the surface at (u, v)."""
+    w, a, b, c = planes
+    depth = 1 / (w[0] * u + w[1] * v + w[2])
+    shade = (a[0] * u + a[1] * v + a[2]) * depth
+    along = (b[0] * u + b[1] * v + b[2]) * depth
+    around = (c[0] * u + c[1] * v + c[2]) * depth
+    offset, rows, columns, scale = place
+    row = min(max(int(along * scale), 0), rows - 1)
     column = min(max(int(around * columns), 0), columns - 1)
-    dirt = skins[offset + row * columns + column] * (1.0 / 255.0)
-    for c in range(3):
-        colour[c] = shade * tint[part, c] * (1 - dirt * tint[part, 3 + c])
+    return shade, skins[offset + row * columns + column] * (1.0 / 255.0)
+
+
+@compiled
+def _mixed(inverse: Any, seen: Any, part: Any, v: int, u: int) -> bool:
+    """Whether the four samples of pixel (v, u) see more than one surface."""
+    y, x = 2 * v, 2 * u
+    t, a, b, c = seen[y, x], seen[y, x + 1], seen[y + 1, x], seen[y + 1, x + 1]
+    if t < 0 or a < 0 or b < 0 or c < 0:
+        return True
+    own = part[t]
+    if part[a] != own or part[b] != own or part[c] != own:
+        return True
+    p, q, r, s = inverse[y, x], inverse[y, x + 1], inverse[y + 1, x], inverse[y + 1, x + 1]
+    near = max(max(p, q), max(r, s))
+    return bool(near - min(min(p, q), min(r, s)) > FLAT * near)
 
 
 @compiled
@@ -169,63 +195,41 @@ def shade(
     offset, rows, columns, rows a metre. tint (parts, 6): BGR at full light, then how much full dirt takes of each."""
     height, width = image.shape[:2]
     factor = seen.shape[0] // height
-    planes = np.empty((4, 3))
-    colour, mean = np.empty(3), np.empty(3)
     current = -1
+    planes = _planes(0, points, triangles, attributes, lens)
+    place = (layout[0, 0], layout[0, 1], layout[0, 2], layout[0, 3])
+    blue, green, red, less_blue, less_green, less_red = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for v in range(height):
         for u in range(width):
+            samples = 1
             t = seen[v * factor, u * factor]
-            one = True
-            if factor == 2:
-                a, b, c = seen[2 * v, 2 * u + 1], seen[2 * v + 1, 2 * u], seen[2 * v + 1, 2 * u + 1]
-                if a != t or b != t or c != t:
-                    if (
-                        t < 0
-                        or a < 0
-                        or b < 0
-                        or c < 0
-                        or part[a] != part[t]
-                        or part[b] != part[t]
-                        or part[c] != part[t]
-                    ):
-                        one = False
-                    else:
-                        near = max(
-                            inverse[2 * v, 2 * u],
-                            inverse[2 * v, 2 * u + 1],
-                            inverse[2 * v + 1, 2 * u],
-                            inverse[2 * v + 1, 2 * u + 1],
-                        )
-                        far = min(
-                            inverse[2 * v, 2 * u],
-                            inverse[2 * v, 2 * u + 1],
-                            inverse[2 * v + 1, 2 * u],
-                            inverse[2 * v + 1, 2 * u + 1],
-                        )
-                        one = near - far < FLAT * near
-            if one:
-                if t < 0:
-                    continue
-                if t != current:
-                    _planes(t, points, triangles, attributes, lens, planes)
-                    current = t
-                _colour(planes, u, v, part[t], skins, layout, tint, colour)
-                for k in range(3):
-                    image[v, u, k] = min(max(int(colour[k] + 0.5), 0), 255)
+            if factor == 2 and (
+                seen[2 * v, 2 * u + 1] != t or seen[2 * v + 1, 2 * u] != t or seen[2 * v + 1, 2 * u + 1] != t
+            ):
+                samples = 4 if _mixed(inverse, seen, part, v, u) else 1
+            if samples == 1 and t < 0:
                 continue
-            mean[:] = 0.0
-            for sample in range(4):
-                dv, du = sample // 2, sample % 2
-                t = seen[2 * v + dv, 2 * u + du]
-                if t < 0:
-                    for k in range(3):
-                        mean[k] += image[v, u, k]
-                    continue
+            b, g, r = 0.5, 0.5, 0.5
+            for sample in range(samples):
+                du, dv = 0.0, 0.0
+                if samples == 4:
+                    t = seen[2 * v + sample // 2, 2 * u + sample % 2]
+                    du, dv = (sample % 2) * 0.5 - 0.25, (sample // 2) * 0.5 - 0.25
+                    if t < 0:
+                        b, g, r = b + 0.25 * image[v, u, 0], g + 0.25 * image[v, u, 1], r + 0.25 * image[v, u, 2]
+                        continue
                 if t != current:
-                    _planes(t, points, triangles, attributes, lens, planes)
+                    planes = _planes(t, points, triangles, attributes, lens)
                     current = t
-                _colour(planes, u + du * 0.5 - 0.25, v + dv * 0.5 - 0.25, part[t], skins, layout, tint, colour)
-                for k in range(3):
-                    mean[k] += colour[k]
-            for k in range(3):
-                image[v, u, k] = min(max(int(mean[k] * 0.25 + 0.5), 0), 255)
+                    k = part[t]
+                    place = (layout[k, 0], layout[k, 1], layout[k, 2], layout[k, 3])
+                    blue, green, red = tint[k, 0], tint[k, 1], tint[k, 2]
+                    less_blue, less_green, less_red = tint[k, 3], tint[k, 4], tint[k, 5]
+                light, dirt = _surface(planes, u + du, v + dv, place, skins)
+                light /= samples
+                b += light * blue * (1 - dirt * less_blue)
+                g += light * green * (1 - dirt * less_green)
+                r += light * red * (1 - dirt * less_red)
+            image[v, u, 0] = min(max(int(b), 0), 255)
+            image[v, u, 1] = min(max(int(g), 0), 255)
+            image[v, u, 2] = min(max(int(r), 0), 255)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from devices.world.compiled import compiled
+from devices.world.settings import Lens
+from vision.capture import Image
 
 Array = NDArray[np.float64]
-NOISE = 1 << 20
+NOISE_OFFSETS = 1 << 20
 GREEN = (0.30, 1.0, 0.22)  # what blue, green and red pixels make of the laser's light
 
 
@@ -31,39 +34,31 @@ def add_spots(image: Any, centres: Any, amplitude: Any, sigma: Any, streak: Any)
                     image[y, x, c] = min(int(image[y, x, c] + value * GREEN[c] + 0.5), 255)
 
 
-def noise_tile(sigma: float, seed: int) -> NDArray[np.int8]:
-    """Rounded Gaussian noise, drawn once and laid over every image at another offset."""
-    random = np.random.default_rng([seed, 3])
-    return np.asarray(np.clip(np.round(random.normal(0, sigma, NOISE)), -127, 127), np.int8)
+class Sensor:
+    """Vignette, noise and, for a grey camera, the loss of colour, laid over images of one size."""
 
+    def __init__(self, width: int, height: int, settings: Lens, seed: int) -> None:
+        v, u = np.mgrid[0:height, 0:width]
+        r2 = ((u - (width - 1) / 2) ** 2 + (v - (height - 1) / 2) ** 2) / ((width / 2) ** 2 + (height / 2) ** 2)
+        self._fall = np.repeat(np.round(255 * (1 - settings.vignette * r2)).astype(np.uint8)[..., None], 3, axis=2)
+        self._shape = (height, width, 3)
+        self._colour = settings.colour
+        self._seed = seed
+        random = np.random.default_rng([seed, 3])
+        noise = random.standard_normal(height * width * 3 + NOISE_OFFSETS, dtype=np.float32)
+        rounded = np.round(noise * settings.noise)
+        self._above = np.clip(rounded, 0, 255).astype(np.uint8)
+        self._below = np.clip(-rounded, 0, 255).astype(np.uint8)
 
-@compiled
-def _mixed(x: int) -> int:
-    """A well-mixed 20-bit number of x: splitmix64."""
-    z = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return int((z ^ (z >> np.uint64(31))) & np.uint64(0x7FFFFFFF))
+    def darkened(self, image: Image) -> Image:
+        """The image (h, w, 3) with less light toward its corners."""
+        return np.asarray(cv2.multiply(image, self._fall, scale=1 / 255), np.uint8)
 
-
-@compiled
-def expose(image: Any, fall: Any, noise: Any, frame: int) -> None:
-    """Darken by fall (h, w), 256 = not at all, and add noise in place; `frame` chooses the noise, the same one the
-    same."""
-    height, width, channels = image.shape
-    length = width * channels
-    for v in range(height):
-        offset = _mixed(frame * 65536 + v) % (NOISE - length)
-        for u in range(width):
-            gain = fall[v, u]
-            for c in range(channels):
-                value = ((image[v, u, c] * gain + 128) >> 8) + noise[offset + u * channels + c]
-                image[v, u, c] = min(max(value, 0), 255)
-
-
-def vignette(width: int, height: int, share: float) -> NDArray[np.int32]:
-    """fall (h, w) for `expose`: 256 in the middle, less by `share` in the corners, growing with the square of the
-    distance."""
-    v, u = np.mgrid[0:height, 0:width]
-    r2 = ((u - (width - 1) / 2) ** 2 + (v - (height - 1) / 2) ** 2) / ((width / 2) ** 2 + (height / 2) ** 2)
-    return np.asarray(np.round(256 * (1 - share * r2)), np.int32)
+    def exposed(self, image: Image, number: int) -> Image:
+        """The image (h, w, 3) with noise, grey where the camera is. `number` chooses the noise: the same one, the
+        same."""
+        start = int(np.random.Philox(key=self._seed, counter=number).random_raw() % NOISE_OFFSETS)
+        part = slice(start, start + self._shape[0] * self._shape[1] * 3)
+        noisy = cv2.add(image, self._above[part].reshape(self._shape))
+        noisy = cv2.subtract(noisy, self._below[part].reshape(self._shape))
+        return np.asarray(noisy if self._colour else cv2.cvtColor(noisy, cv2.COLOR_BGR2GRAY), np.uint8)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from devices.world import raster
 from devices.world.background import background, surroundings
 from devices.world.raycast import cast, hidden
-from devices.world.sensor import add_spots, expose, noise_tile, vignette
+from devices.world.sensor import Sensor, add_spots
 from devices.world.settings import WorldSettings
 from devices.world.skin import lit, skins
 from devices.world.turbine import BLADES, INSPECTED, SKY, TurbineShape
@@ -75,10 +75,9 @@ class Renderer:
         self._skins = skins(shape, settings.blade, settings.light, settings.camera.exposure, settings.seed)
         self._attributes = np.column_stack([lit(mesh.normals, settings.light), mesh.skin]).astype(np.float64)
         self._tiles = surroundings(settings.light, settings.seed)
-        self._noise = noise_tile(settings.camera.noise, settings.seed)
         self._points = np.empty_like(mesh.vertices)
         self._buffers: dict[tuple[int, int], tuple[NDArray[np.float32], NDArray[np.int32]]] = {}
-        self._falls: dict[tuple[int, int], NDArray[np.int32]] = {}
+        self._sensors: dict[tuple[int, int], Sensor] = {}
         self._lenses: dict[Camera, _Distortion] = {}
 
     def visibility(
@@ -112,6 +111,7 @@ class Renderer:
             np.ascontiguousarray(pose.position),
             -self.shape.ground_m,
             settings.camera.exposure,
+            seen,
         )
         dressed = self._skins
         raster.shade(
@@ -181,15 +181,12 @@ class Renderer:
         streak = np.full(len(which), self.settings.camera.streak_px * camera.width / 612.0)
         add_spots(image, pixels, amplitude, sigma, streak)
 
-    def expose(self, image: Image, frame: int) -> Image:
-        """The sensor's image of a drawn one, which it overwrites: vignette, noise, grey where the camera is."""
-        height, width = image.shape[:2]
-        if (height, width) not in self._falls:
-            self._falls[height, width] = vignette(width, height, self.settings.camera.vignette)
-        expose(image, self._falls[height, width], self._noise, frame)
-        if self.settings.camera.colour:
-            return image
-        return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+    def sensor(self, camera: Camera) -> Sensor:
+        """The sensor of a camera of this size."""
+        size = (camera.width, camera.height)
+        if size not in self._sensors:
+            self._sensors[size] = Sensor(*size, self.settings.camera, self.settings.seed)
+        return self._sensors[size]
 
     def _distortion(self, camera: Camera) -> _Distortion | None:
         if not any(camera.distortion):
@@ -290,14 +287,15 @@ def draw(
     blur = renderer.settings.camera.motion_blur
     for eye, camera in enumerate((geometry.stereo.left, geometry.stereo.right)):
         place = pose if eye == 0 else right_pose(geometry, pose)
-        off = smeared(renderer.scenery(camera, place), (shift[0] * blur, shift[1] * blur))
+        sensor = renderer.sensor(camera)
+        off = smeared(sensor.darkened(renderer.scenery(camera, place)), (shift[0] * blur, shift[1] * blur))
         on = None
         if both:
             on = moved(off, shift)
             if spots is not None:
                 renderer.add_laser(on, spots, camera, place)
-            on = renderer.expose(on, 4 * frame + 2 + eye)
-        images += [renderer.expose(off, 4 * frame + eye), on]
+            on = sensor.exposed(on, 4 * frame + 2 + eye)
+        images += [sensor.exposed(off, 4 * frame + eye), on]
     return StereoFrames(stamp_s, images[0], images[2], images[1], images[3])
 
 
