@@ -34,7 +34,8 @@ class Behaviour:
     """One entry of the registry.
 
     outcomes: name → what it means, the only values `run` may return. airborne: it expects to be flying while it runs,
-    or None where it does not care. needs_vision: it cannot work without images.
+    or None where it does not care. needs_vision: it cannot work without images. keeps_standoff: it keeps its parameter
+    `standoff_m` all the time, so that the monitor may hold it to that.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Behaviour:
     airborne: bool | None
     needs_vision: bool
     text: str
+    keeps_standoff: bool = False
 
 
 _REGISTRY: dict[str, Behaviour] = {}
@@ -55,6 +57,7 @@ def behaviour(
     parameters: type[Parameters] = NoParameters,
     airborne: bool | None = True,
     needs_vision: bool = False,
+    keeps_standoff: bool = False,
 ) -> Callable[[Callable[[Services, P], Awaitable[str]]], Callable[[Services, P], Awaitable[str]]]:
     """Register a coroutine as the behaviour of its own name; users read its docstring in `mission list behaviours`."""
 

@@ -27,6 +27,7 @@ class FollowEdge(Parameters):
 
 EDGE_PATIENCE_S = 4.0  # the wanted edge unseen for so long, though the blade is seen
 TIP_WINDOW_S = 2.0
+TIP_WITHIN_M = 4.0  # of where the turbine file has it: what looks like a tip elsewhere is dirt or another blade
 PAST_TIP_M = 1.5  # beyond the expected tip nothing is followed
 ROOT_MARGIN_M = 4.0  # the root's beginning is expected inside the root radius plus this
 NEAREST_ROOT_M = 2.6  # never nearer to the hub's centre than this
@@ -71,7 +72,8 @@ async def follow_edge(services: Services, parameters: FollowEdge) -> str:
             if now - started > EDGE_PATIENCE_S and unseen_s > EDGE_PATIENCE_S:
                 return "edge_lost"
             if parameters.toward == "tip":
-                if agreed_tip(perception.tips, max(started, now - TIP_WINDOW_S)) is not None:
+                tip = agreed_tip(perception.tips, max(started, now - TIP_WINDOW_S))
+                if tip is not None and abs(tip - services.turbine.tip_radius_m) < TIP_WITHIN_M:
                     services.memory.passes_done.append(parameters.side)
                     return "tip_detected"
                 if estimate.station_m > services.turbine.tip_radius_m + PAST_TIP_M:
