@@ -8,7 +8,7 @@ from typing import Any
 from pymavlink.dialects.v20 import development as mavlink
 
 from devices.vehicle.body import GRAVITY
-from devices.vehicle.vehicle import RANGE_MAX_M, SimulatedVehicle
+from devices.vehicle.vehicle import RANGE_MAX_M, RANGE_MIN_M, SimulatedVehicle
 
 _METRES_PER_DEGREE = math.radians(1.0) * 6_371_000.0
 _NO_COVARIANCE = [math.nan] * 21
@@ -150,7 +150,7 @@ def distance_sensor(v: SimulatedVehicle) -> Any:
     seen = v.range_m is not None
     distance = round(v.range_m * 100) if v.range_m is not None else most + 1
     return mavlink.MAVLink_distance_sensor_message(
-        *(milliseconds(v), 20, most, distance),
+        *(milliseconds(v), round(RANGE_MIN_M * 100), most, distance),
         *(mavlink.MAV_DISTANCE_SENSOR_LASER, 0, mavlink.MAV_SENSOR_ROTATION_NONE, 0),
         signal_quality=100 if seen else 1,
     )

@@ -7,13 +7,14 @@ import json
 import os
 import select
 import signal
-import sys
 import time
 from typing import Any
 
+import numpy as np
+
 from devices.vehicle.fault_switches import FaultSwitches
 from devices.vehicle.mavlink_face import MavlinkFace
-from devices.vehicle.settings import ProcessSettings
+from devices.vehicle.settings import ProcessSettings, Surroundings
 from devices.vehicle.truth_channel import answer
 from devices.vehicle.truth_log import TruthLog
 from devices.vehicle.udp_link import UdpLink, bind_udp
@@ -173,19 +174,29 @@ class VehicleServer:
                 self.stop("without a parent for too long")
 
 
-def serve(settings: ProcessSettings, forward_range: ForwardRange | None = None, announce: bool = True) -> None:
+def range_finder(surroundings: Surroundings) -> ForwardRange:
+    """What a range finder sees of a turbine. Asked once beforehand, so that nothing is compiled in flight."""
+    from devices.world.turbine import TurbineShape
+    from devices.world.world import World
+
+    settings = surroundings.settings
+    shape = TurbineShape.of(surroundings.turbine, surroundings.site, settings.survey_error)
+    world = World(shape, settings)
+    world.forward_range(np.zeros(3), np.zeros(3))
+    return world.forward_range
+
+
+def serve(settings: ProcessSettings) -> None:
     """Run a vehicle in this process until SIGTERM; print its ports as one JSON line first.
 
     Raises:
         PortInUseError, OSError: it could not start.
     """
-    server = VehicleServer(settings, forward_range)
+    server = VehicleServer(settings, range_finder(settings.world) if settings.world is not None else None)
     signal.signal(signal.SIGTERM, lambda number, frame: server.stop("SIGTERM"))
     if settings.watch_parent:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     else:
         signal.signal(signal.SIGINT, lambda number, frame: server.stop("SIGINT"))
-    if announce:
-        print(json.dumps(server.ports), flush=True)
-        sys.stdout.flush()
+    print(json.dumps(server.ports), flush=True)
     server.run()

@@ -55,12 +55,19 @@ class LinkSettings(_Section):
     remote_port: int | None = Field(None, ge=1, le=65535, description="None: wait for the first datagram.")
 
 
+class Surroundings(_Section):
+    """What stands around the vehicle, for its range finder: the fields of a turbine and a site file, and the world."""
+
+    turbine: dict[str, Any]
+    site: dict[str, Any]
+    settings: WorldSettings = Field(default_factory=WorldSettings)
+
+
 class ProcessSettings(_Section):
     """A vehicle in its own process.
 
     folder: where truth.csv and vehicle_events.jsonl go, None for no record. watch_parent: when the process that started
-    it dies, fly on until landed or `orphan_s` wall seconds have passed, then exit. world: the settings of a world and
-    the fields of a turbine's placement that `devices.world` understands, for the range finder; None for an empty sky.
+    it dies, fly on until landed or `orphan_s` wall seconds have passed, then exit. world: None for an empty sky.
     """
 
     vehicle: VehicleSettings = Field(default_factory=VehicleSettings)
@@ -71,4 +78,4 @@ class ProcessSettings(_Section):
     folder: Path | None = None
     watch_parent: bool = False
     orphan_s: float = Field(20.0, ge=0)
-    world: dict[str, Any] | None = None
+    world: Surroundings | None = None

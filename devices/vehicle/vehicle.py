@@ -29,7 +29,7 @@ TICK_STEPS = 5
 TICK_S = TICK_STEPS * STEP_S
 _RANGE_EVERY_TICKS = 5
 _RANGE_NOISE_M = 0.02
-RANGE_MAX_M = 40.0
+RANGE_MIN_M, RANGE_MAX_M = 0.2, 40.0
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,8 @@ class SimulatedVehicle:
         body = self.body
         metres = self.forward_range(np.array([body.n, body.e, body.d]), np.array([body.roll, body.pitch, body.yaw]))
         noise = _RANGE_NOISE_M * float(self._range_rng.standard_normal())
-        if metres is not None and math.isfinite(metres) and metres < RANGE_MAX_M:
-            self.range_m = max(metres + noise, 0.05)
+        if metres is not None and RANGE_MIN_M < metres < RANGE_MAX_M:
+            self.range_m = metres + noise
 
     def _note(self, kind: str, **data: Any) -> None:
         self.events.append(VehicleEvent(self.time_s, kind, data))
