@@ -65,9 +65,8 @@ def behaviour(
         name = run.__name__
         if name in _REGISTRY and _REGISTRY[name].run.__module__ != run.__module__:
             raise ValueError(f"behaviour {name!r} is declared in {_REGISTRY[name].run.__module__} and {run.__module__}")
-        _REGISTRY[name] = Behaviour(
-            name, run, parameters, dict(outcomes), airborne, needs_vision, (run.__doc__ or "").strip()
-        )
+        text = (run.__doc__ or "").strip()
+        _REGISTRY[name] = Behaviour(name, run, parameters, dict(outcomes), airborne, needs_vision, text, keeps_standoff)
         return run
 
     return register

@@ -41,6 +41,7 @@ NEAREST_ROOT_M = 2.6  # never nearer to the hub's centre than this
     },
     parameters=FollowEdge,
     needs_vision=True,
+    keeps_standoff=True,
 )
 async def follow_edge(services: Services, parameters: FollowEdge) -> str:
     """Follow the leading or trailing edge toward tip or root at the standoff, slower as the images grow old.

@@ -465,7 +465,7 @@ class Executive:
     def _snapshot(self, was_ours: bool = True) -> Snapshot:
         state = self.mission.states[self._machine.state]
         behaviour = self._work.behaviour
-        keeps = behaviour is not None and getattr(behaviour, "keeps_standoff", False)
+        keeps = behaviour is not None and behaviour.keeps_standoff
         return snapshots.take(
             self.services,
             entered_s=self._timing.entered_s.get(state.path, 0.0),
