@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from devices.rig import CaptureError
 from devices.world.view import draw
-from devices.world.world import TruePose, World
+from devices.world.world import Carrier, World
 from vision.camera import RigGeometry
 from vision.capture import CameraPose, StereoFrames, camera_pose
 
@@ -32,7 +32,7 @@ class SimulatedRig:
         world: World,
         geometry: RigGeometry,
         mount: Array,
-        true_pose: Callable[[], TruePose],
+        true_pose: Callable[[], Carrier],
         now: Callable[[], float],
     ) -> None:
         self.world = world
@@ -54,6 +54,7 @@ class SimulatedRig:
             if faults.active("images", now) or faults.active("blackout", now):
                 raise CaptureError("no images: the simulated cameras deliver nothing (world.faults)")
             true = self._true_pose()
+            stamp: float | None = getattr(true, "stamp_s", None)
             pose = camera_pose(true.position, true.attitude, true.gimbal, self.mount)
             frames = draw(
                 self.world.renderer,
@@ -61,7 +62,7 @@ class SimulatedRig:
                 pose,
                 laser=laser,
                 lit=not faults.active("laser_off", now),
-                stamp_s=now if true.stamp_s is None else true.stamp_s,
+                stamp_s=now if stamp is None else stamp,
                 frame=self._count,
                 shift=self._shift(true, pose),
             )
@@ -71,7 +72,7 @@ class SimulatedRig:
                 frames = replace(frames, right=None, right_laser=None)
             return frames
 
-    def _shift(self, true: TruePose, pose: CameraPose) -> tuple[float, float]:
+    def _shift(self, true: Carrier, pose: CameraPose) -> tuple[float, float]:
         """Pixels that the scene in the middle of the image moves by between the laser-off and the laser-on exposure."""
         gap = self.world.settings.camera.frame_gap_s
         if true.velocity is None or gap == 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,22 @@ Array = NDArray[np.float64]
 
 RANGE_REACH_M = 40.0
 RANGE_CONE_RAD = np.deg2rad(1.5)
+
+
+class Carrier(Protocol):
+    """What a rig must know of the vehicle that carries it, as in `TruePose`. It may also have a `stamp_s`."""
+
+    @property
+    def position(self) -> Array: ...
+
+    @property
+    def attitude(self) -> Array: ...
+
+    @property
+    def gimbal(self) -> Array: ...
+
+    @property
+    def velocity(self) -> Array | None: ...
 
 
 @dataclass(frozen=True)
