@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import Camera
-from vision.edges import Candidate
+from vision.candidates import Candidate
 from vision.surface import Surface
 
 Array = NDArray[np.float64]

@@ -20,11 +20,14 @@ LARGEST_MOTION = 12.0  # px between laser-off and laser-on
 
 @dataclass(frozen=True)
 class Spots:
-    """Bright compact spots that the laser may have made: uv (n, 2) px, level above the surroundings, sigma_px (n,)."""
+    """Bright compact spots that the laser may have made: uv (n, 2) px, level above the surroundings, sigma_px (n,).
+
+    motion (2,) px brings the laser-off image onto the laser-on image."""
 
     uv: Array
     level: Array
     sigma_px: Array
+    motion: Array
 
     def __len__(self) -> int:
         return len(self.uv)
@@ -73,7 +76,7 @@ def find_spots(off: Image, on: Image) -> Spots:
     response = cv2.subtract(smooth, cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
     noise = float(np.mean(difference[::4, ::4])) + 0.3
     peaks = _peaks(response, max(3.0, 2.0 * noise))
-    return _centroids(on, still, peaks)
+    return _centroids(on, still, peaks, motion)
 
 
 def _peaks(response: Image, threshold: float) -> NDArray[np.int64]:
@@ -89,12 +92,12 @@ def _peaks(response: Image, threshold: float) -> NDArray[np.int64]:
     return uv[order[:MOST]]
 
 
-def _centroids(on: Image, off: Image, peaks: NDArray[np.int64]) -> Spots:
+def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -> Spots:
     height, width = on.shape
     inside = (peaks[:, 0] >= 2) & (peaks[:, 1] >= 2) & (peaks[:, 0] < width - 2) & (peaks[:, 1] < height - 2)
     peaks = peaks[inside]
     if len(peaks) == 0:
-        return Spots(np.empty((0, 2)), np.empty(0), np.empty(0))
+        return Spots(np.empty((0, 2)), np.empty(0), np.empty(0), motion)
     reach = np.arange(-REACH, REACH + 1)
     dv, du = np.meshgrid(reach, reach, indexing="ij")
     v = np.clip(peaks[:, 1, None, None] + dv, 0, height - 1)
@@ -120,7 +123,7 @@ def _centroids(on: Image, off: Image, peaks: NDArray[np.int64]) -> Spots:
     keep = (level > 1.2 * noise / 2) & (level > 0.8)
     uv = peaks + centre
     keep &= _first_of_each(uv, 4.0)
-    return Spots(uv[keep], level[keep].astype(float), sigma[keep])
+    return Spots(uv[keep], level[keep].astype(float), sigma[keep], motion)
 
 
 def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:
@@ -128,3 +131,13 @@ def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:
     distance = np.hypot(*(uv[:, None] - uv[None]).transpose(2, 0, 1))
     near = np.triu(distance < apart_px, 1)
     return ~near.any(axis=0)
+
+
+def without_spots(on: Image, off: Image, spots: Spots, reach: int = 5) -> Image:
+    """The laser-on image (h, w) with every spot painted over from the laser-off image, moved as `spots.motion` says."""
+    still = shifted(off, spots.motion) if spots.motion.any() else off
+    clean = on.copy()
+    for u, v in np.rint(spots.uv).astype(int).tolist():
+        box = (slice(max(v - reach, 0), v + reach + 1), slice(max(u - reach, 0), u + reach + 1))
+        clean[box] = still[box]
+    return clean

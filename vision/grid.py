@@ -83,6 +83,16 @@ def grid_coordinates(points: Array, laser: LaserGrid) -> Array:
     return result
 
 
+def expected_points(laser: LaserGrid, depth_m: float, slope: Array) -> Array:
+    """Points (rows * columns, 3) m where the laser's rays meet the plane depth = depth_m + slope · (y, z); NaN behind."""
+    directions = laser.directions().reshape(-1, 3)
+    ahead = directions[:, 0] - directions[:, 1:] @ slope
+    reach = (depth_m + laser.position[1:] @ slope - laser.position[0]) / ahead
+    points = laser.position + reach[:, None] * directions
+    points[(reach <= 0) | (points[:, 0] < 0.3)] = np.nan
+    return np.asarray(points, float)
+
+
 def match_eyes(
     rays_left: Array,
     rays_right: Array,

@@ -17,6 +17,8 @@ SPREAD = 2  # bins to each side that a pixel votes for: its gradient's direction
 RHO_STEP = 2.0  # px of the half-size image
 REACH = 7  # px across a candidate line within which its step is looked for
 SAMPLES = 96  # profiles along a candidate line
+FOCUS_PX = 160.0  # standard deviation of the weight about the place where a bending edge is to be right
+SLOPE_HELD, BEND_HELD = 0.05, 1e-4  # what a fit of few steps is held to: slope, and change of slope per px over two
 
 
 def grey_noise(grey: Image) -> float:
@@ -35,15 +37,12 @@ class Gradients:
     weight: Array
 
 
-def edge_pixels(grey: Image, noise: float, masked: Array) -> Gradients:
-    """Pixels whose brightness changes by more than noise; those within 7 px of the points `masked` (n, 2) are left out."""
+def edge_pixels(grey: Image, noise: float) -> Gradients:
+    """Pixels whose brightness changes by more than noise."""
     half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     half = cv2.blur(half, (3, 3))
     dx, dy = cv2.Sobel(half, cv2.CV_16S, 1, 0), cv2.Sobel(half, cv2.CV_16S, 0, 1)
     strength = cv2.addWeighted(cv2.convertScaleAbs(dx), 0.5, cv2.convertScaleAbs(dy), 0.5, 0)
-    if len(masked):
-        for u, v in np.rint(masked / 2).astype(int):
-            strength[max(v - 3, 0) : v + 4, max(u - 3, 0) : u + 4] = 0
     threshold = max(2.0, 1.6 * noise)
     v, u = np.nonzero(strength[2:-2, 2:-2] > threshold)
     v, u = v + 2, u + 2
@@ -87,7 +86,8 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
 class Profiles:
     """K lines, each sampled at SAMPLES places: refined normals (k, 2), rho (k,) signed along them (image frame, px), places
     `t` (k, m) along the direction (normal turned by +90°), offset (k, m) px of the step from the refined line, signed step
-    (k, m) in grey levels along the normal, and `agrees` (k, m): the step is real and lies on the line."""
+    (k, m) in grey levels along the normal, and `agrees` (k, m): the step is real and lies on the line. The line is the tangent
+    at `focus` (k,) of an edge whose slope changes by `bend` (k,) per px; offsets are from that curve."""
 
     normal: Array
     rho: Array
@@ -97,6 +97,12 @@ class Profiles:
     agrees: NDArray[np.bool_]
     slope_sigma: Array
     rho_sigma: Array
+    bend: Array
+    focus: Array
+
+    def take(self, which: NDArray[np.int64]) -> Profiles:
+        """Some of the lines."""
+        return Profiles(*(value[which] for value in vars(self).values()))
 
     @property
     def direction(self) -> Array:
@@ -155,31 +161,34 @@ def refine_lines(
     offset = across[1:-1][best] + np.clip(fraction, -0.5, 0.5)
     step = np.take_along_axis(gradient, best[..., None], -1)[..., 0]
     real = peak > max(1.2, 1.4 * noise)
-    slope, shift = _vote_slope(t - focus[:, None], offset, real, slopes_deg)
-    weight = real.astype(float)
+    place = t - focus[:, None]
+    slope, shift = _vote_slope(place, offset, real, slopes_deg)
+    fit = np.stack([shift, slope, np.zeros_like(slope)], axis=1)
+    near = np.exp(-0.5 * (place / FOCUS_PX) ** 2)
+    design = np.stack([np.ones_like(place), place, place * place], axis=2)
     for tolerance in (2.0, 1.2, 1.0, 1.0):
-        residual = offset - (shift[:, None] + slope[:, None] * (t - focus[:, None]))
-        near = np.exp(-0.5 * ((t - focus[:, None]) / 220) ** 2)
+        residual = offset - (design @ fit[..., None])[..., 0]
         weight = real * near / (1 + (residual / tolerance) ** 2) ** 2
-        slope, shift = _weighted_line(t - focus[:, None], offset, weight, slope, shift)
-    residual = offset - (shift[:, None] + slope[:, None] * (t - focus[:, None]))
+        fit, information = _weighted_curve(design, offset, weight, fit)
+    residual = offset - (design @ fit[..., None])[..., 0]
     agrees = real & (np.abs(residual) < 1.5)
-    turn = np.arctan(slope)
+    turn = np.arctan(fit[:, 1])
     new_normal = np.column_stack(
         [
             normal[:, 0] * np.cos(turn) - direction[:, 0] * np.sin(turn),
             normal[:, 1] * np.cos(turn) - direction[:, 1] * np.sin(turn),
         ]
     )
-    point = normal * (rho + shift)[:, None] + direction * focus[:, None]
+    point = normal * (rho + fit[:, 0])[:, None] + direction * focus[:, None]
     new_rho = (new_normal * point).sum(axis=1)
-    count = np.maximum(agrees.sum(axis=1), 1)
-    scatter = np.sqrt((residual**2 * agrees).sum(axis=1) / count) + 0.1
-    spread = np.sqrt(((t - focus[:, None]) ** 2 * agrees).sum(axis=1) / count) + 3.0
-    free = np.maximum(count / 3, 1)  # neighbouring profiles share pixels
-    slope_sigma = scatter / spread / np.sqrt(free)
-    rho_sigma = np.hypot(scatter / np.sqrt(free), 0.08)
-    return Profiles(new_normal, new_rho, t, residual, step, agrees, slope_sigma, rho_sigma)
+    used = agrees * near
+    scatter2 = (residual**2 * used).sum(axis=1) / np.maximum(used.sum(axis=1), 1) + 0.01
+    # Neighbouring profiles share pixels: three of them count as one.
+    covariance = np.linalg.inv(information) * (3 * scatter2)[:, None, None]
+    slope_sigma = np.sqrt(covariance[:, 1, 1])
+    rho_sigma = np.sqrt(covariance[:, 0, 0] + 0.08**2)
+    bend_px = 2 * fit[:, 2]
+    return Profiles(new_normal, new_rho, t, residual, step, agrees, slope_sigma, rho_sigma, bend_px, focus)
 
 
 def _vote_slope(t: Array, offset: Array, real: NDArray[np.bool_], slopes_deg: float) -> tuple[Array, Array]:
@@ -190,7 +199,7 @@ def _vote_slope(t: Array, offset: Array, real: NDArray[np.bool_], slopes_deg: fl
     index = np.arange(lines)[:, None]
     best = np.full(lines, -1.0)
     slope, shift = np.zeros(lines), np.zeros(lines)
-    near = real * np.exp(-0.5 * (t / 220) ** 2)
+    near = real * np.exp(-0.5 * (t / 120) ** 2)
     for tried in slopes:
         place = np.clip(np.rint(offset - tried * t), -bins // 2 + 1, bins // 2 - 1).astype(np.int64) + bins // 2
         counts = np.bincount((index * bins + place).ravel(), near.ravel(), lines * bins).reshape(lines, bins)
@@ -203,13 +212,13 @@ def _vote_slope(t: Array, offset: Array, real: NDArray[np.bool_], slopes_deg: fl
     return slope, shift
 
 
-def _weighted_line(t: Array, offset: Array, weight: Array, slope: Array, shift: Array) -> tuple[Array, Array]:
-    total = weight.sum(axis=1)
-    safe = np.maximum(total, 1e-9)
-    mean_t, mean_o = (weight * t).sum(axis=1) / safe, (weight * offset).sum(axis=1) / safe
-    dt = t - mean_t[:, None]
-    variance = (weight * dt**2).sum(axis=1)
-    new = (weight * dt * offset).sum(axis=1) / np.maximum(variance, 1e-9)
-    good = (total > 2) & (variance > 50)
-    new_slope = np.where(good, np.clip(new, -0.3, 0.3), slope)
-    return new_slope, np.where(good, mean_o - new_slope * mean_t, shift)
+def _weighted_curve(design: Array, offset: Array, weight: Array, before: Array) -> tuple[Array, Array]:
+    """Offset, slope and bend (k, 3) by weighted least squares, held straight where little speaks for a bend."""
+    held = np.diag([1e-4, 1e-4 / SLOPE_HELD**2, 1.0 / BEND_HELD**2])
+    weighted = design * weight[..., None]
+    information = np.einsum("kmi,kmj->kij", weighted, design) + held
+    fit = np.linalg.solve(information, np.einsum("kmi,km->ki", weighted, offset)[..., None])[..., 0]
+    good = (weight.sum(axis=1) > 2)[:, None]
+    return np.where(good, fit, before), information
+
+

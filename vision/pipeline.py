@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from vision.camera import RigGeometry
 from vision.capture import Image, StereoFrames
 from vision.chord import chord
-from vision.dots import Spots, find_spots
-from vision.edges import Candidate, OtherEye, edge_of, find_edges
-from vision.grid import Matches, grid_coordinates, match_eyes, match_laser
+from vision.dots import Spots, find_spots, without_spots
+from vision.candidates import Blade, Candidate, OtherEye, texture_between
+from vision.edges import edge_of, find_edges
+from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser
 from vision.lines import grey_noise
 from vision.observation import BladeObservation, Dots, Line, Tip
 from vision.quality import exposure, sharpness
@@ -110,15 +111,17 @@ class Eye:
         watch: Stopwatch,
     ) -> BladeObservation:
         factor, camera = self.factor, self._stereo.left
-        grey = images["left_laser"].grey
+        grey = without_spots(images["left_laser"].grey, images["left"].grey, left)
+        smooth = cv2.blur(grey, (3, 3))
         seeds = left.uv[blade.left]
+        dots = seeds - camera.centre
+        around = Blade(dots, self._absent(left, right, blade, surface), texture_between(smooth, seeds))
         other = None
         if right is not None:
             other = OtherEye(cv2.blur(images["right_laser"].grey, (3, 3)), self._stereo, surface)
-        edges, axis, reasons = find_edges(grey, seeds, left.uv, other)
+        edges, axis, reasons = find_edges(grey, around, other)
         watch.lap("edges")
-        dots = seeds - camera.centre
-        outline = find_tip(cv2.blur(grey, (3, 3)), grey_noise(grey), edges, axis, dots)
+        outline = find_tip(smooth, grey_noise(grey), edges, axis, dots)
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]
         width = chord(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
@@ -188,6 +191,30 @@ class Eye:
                     taken.add((r, c))
                     uv, row, column = np.vstack([uv, left.uv[index]]), np.append(row, r), np.append(column, c)
         return Dots(to_full(uv, self.factor), row, column)
+
+    def _absent(self, left: Spots, right: Spots | None, blade: Matches, surface: Surface) -> Array:
+        """Where dots would lie in the left image (image frame, working px) if the blade went on, but are none."""
+        laser, stereo = self.geometry.laser, self._stereo
+        assert laser is not None
+        points = expected_points(laser, surface.depth_m, surface.slope)
+        free = np.isfinite(points[:, 0])
+        free[blade.row * laser.columns + blade.column] = False
+        points = points[free]
+        inside = np.ones(len(points), bool)
+        pixels = []
+        for camera, spots, there in (
+            (stereo.left, left, points),
+            (stereo.right, right, points @ stereo.rotation.T + stereo.translation),
+        ):
+            uv = camera.project(there)
+            pixels.append(uv)
+            if spots is None:
+                continue
+            inside &= (uv > 6).all(axis=1) & (uv < (camera.width - 7, camera.height - 7)).all(axis=1)
+            if len(spots):
+                apart = np.hypot(*(uv[:, None] - spots.uv[None]).transpose(2, 0, 1)).min(axis=1)
+                inside &= apart > 6
+        return np.asarray(pixels[0][inside] - stereo.left.centre, float)
 
     def _check_size(self, name: str, image: Image) -> None:
         camera = self.geometry.stereo.right if name.startswith("right") else self.geometry.stereo.left

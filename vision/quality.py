@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.edges import Candidate
+from vision.candidates import Candidate
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.edges import Candidate
+from vision.candidates import Candidate
 from vision.lines import visible_stretch
 
 Array = NDArray[np.float64]
@@ -50,12 +50,10 @@ def _end_of(edge: Candidate, toward: Array) -> tuple[float, float]:
     direction = profile.direction[k]
     sign = 1.0 if direction @ toward > 0 else -1.0
     order = slice(None) if sign > 0 else slice(None, None, -1)
-    t, agrees = profile.t[k][order], profile.agrees[k][order]
-    share = np.convolve(agrees, np.ones(7) / 7, mode="same")
-    good = np.flatnonzero(share > 0.5)
+    t = profile.t[k][order]
     foot = profile.normal[k] * profile.rho[k]
-    along = (foot + t[:, None] * direction) @ toward
-    return float(along[good[-1]]) if len(good) else float(along[0]), float(along[-1])
+    last = foot + edge.ends[1 if sign > 0 else 0] * direction
+    return float(last @ toward), float((foot + t[-1] * direction) @ toward)
 
 
 def _closed_end(

@@ -1,0 +1,251 @@
+"""Weighs lines as edges of the blade: what speaks for each, from its steps, the dots beside it and the other eye."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.camera import StereoPair
+from vision.capture import Image
+from vision.lines import Profiles, refine_lines
+from vision.surface import Surface
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 28
+LEAST_SUPPORT = 0.5
+INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
+PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
+
+
+@dataclass(frozen=True)
+class Blade:
+    """The dots of the blade (n, 2), and where dots would be if it went on but are none, (m, 2); image frame, working px.
+
+    texture: how strong steps on the blade itself are, between neighbouring dots, in grey levels.
+    """
+
+    dots: Array
+    absent: Array
+    texture: float
+
+
+@dataclass(frozen=True)
+class OtherEye:
+    """The other eye's smoothed image and what is needed to look up a point of the blade's surface there."""
+
+    smooth: Image
+    stereo: StereoPair
+    surface: Surface
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A refined line with its outward normal and offset (image frame, working px) and what speaks for it.
+
+    support: share of the stretch beside the dots on which there is a step. parallax: share of that which the other eye sees
+    at the blade's depth. step: its height in grey levels. blocked: share of that stretch on which a step as strong lies between
+    dots and line. empty: share of the dots expected up to the line that are missing. beyond: missing ones past the line.
+    ends: places between which the step goes on, along the direction `profile.direction[index]`.
+    """
+
+    outward: Array
+    rho: float
+    support: float
+    parallax: float
+    step: float
+    blocked: float
+    empty: float
+    beyond: int
+    ends: tuple[float, float]
+    value: float
+    profile: Profiles
+    index: int
+
+
+def texture_between(smooth: Image, dots: Array) -> float:
+    """How strong the steps between neighbouring dots are: what the blade's own dirt and shade do. dots (n, 2) in pixels."""
+    if len(dots) < 3:
+        return 0.0
+    apart = np.hypot(*(dots[:, None] - dots[None]).transpose(2, 0, 1))
+    first, second = np.nonzero(np.triu((apart > 16) & (apart < 44), 1))
+    if len(first) == 0:
+        return 0.0
+    share = np.linspace(0.0, 1.0, 12)[:, None, None]
+    points = (dots[first] * (1 - share) + dots[second] * share).astype(np.float32)
+    values = cv2.remap(smooth, points[..., 0], points[..., 1], cv2.INTER_LINEAR).astype(np.float32)
+    return float(np.quantile(np.abs(values[2:] - values[:-2]).max(axis=0), 0.8))
+
+
+def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherEye | None) -> list[Candidate]:
+    """Candidates out of lines (k, 2) of (theta, signed rho), refined, with what speaks for them."""
+    dots = blade.dots
+    normal = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
+    rho = lines[:, 1]
+    distance = dots @ normal.T - rho  # (dots, lines), positive beyond the line along its normal
+    inside, outside = (distance < 7).mean(axis=0), (distance > -7).mean(axis=0)
+    flip = outside > inside
+    keep = np.maximum(inside, outside) >= 0.96
+    normal[flip], rho = -normal[flip], np.where(flip, -rho, rho)
+    normal, rho = normal[keep][:CANDIDATES], rho[keep][:CANDIDATES]
+    if len(rho) == 0:
+        return []
+    low, high = _beside(dots, normal)
+    for reach, slopes in ((8, 2.4), (4, 0.6)):
+        profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, low, high), reach, slopes)
+        normal, rho = profile.normal, profile.rho
+        low, high = _beside(dots, normal)
+    on_side = (dots @ normal.T - rho > 2.5).mean(axis=0) <= 0.03
+    beside = (profile.t > low[:, None] - 8) & (profile.t < high[:, None] + 8)
+    few = beside.sum(axis=1) < 6
+    beside[few] = True
+    counts = beside.sum(axis=1)
+    support = (profile.agrees & beside).sum(axis=1) / counts
+    good = np.flatnonzero(on_side & (support >= LEAST_SUPPORT))
+    if len(good) == 0:
+        return []
+    profile = profile.take(good)
+    beside, support, low, high = beside[good], support[good], low[good], high[good]
+    step = _typical_step(profile, beside)
+    parallax = _parallax(profile, other, beside, noise) if other is not None else np.full(len(good), 0.8)
+    blocked = _blocked(profile, blade, smooth, step, low, high, noise)
+    strongest = max(float(np.max(np.where(blocked < 0.5, step, 0))), 1.0)
+    found = []
+    for k in range(len(good)):
+        empty, beyond = _missing(blade, profile.normal[k], float(profile.rho[k]), low[k], high[k])
+        value = (
+            2.0 * support[k]
+            + 0.55 * float(np.clip(np.log2(step[k] / strongest), -3.0, 0.5))
+            + 1.2 * (parallax[k] - 0.8)
+            - 2.0 * blocked[k]
+            - 2.5 * empty
+            + 0.12 * min(beyond, 5)
+            + 0.5 * float(np.clip(np.log2(step[k] / max(blade.texture, 1.0)), -2.0, 1.0))
+        )
+        found.append(
+            Candidate(
+                profile.normal[k],
+                float(profile.rho[k]),
+                float(support[k]),
+                float(parallax[k]),
+                float(step[k]),
+                float(blocked[k]),
+                empty,
+                beyond,
+                _run(profile.t[k], profile.agrees[k], float(profile.focus[k])),
+                float(value),
+                profile,
+                k,
+            )
+        )
+    return found
+
+
+def _beside(dots: Array, normal: Array) -> tuple[Array, Array]:
+    """The stretch (low, high) (k,) of each line that has dots beside it."""
+    along = dots @ np.stack([-normal[:, 1], normal[:, 0]])
+    return np.quantile(along, 0.04, axis=0), np.quantile(along, 0.96, axis=0)
+
+
+def _typical_step(profile: Profiles, beside: NDArray[np.bool_]) -> Array:
+    steps = np.where(profile.agrees & beside, np.abs(profile.step), np.nan)
+    none = ~np.isfinite(steps).any(axis=1)
+    steps[none] = 0.0
+    return np.asarray(np.nanmedian(steps, axis=1), float)
+
+
+def _run(t: Array, agrees: NDArray[np.bool_], focus: float) -> tuple[float, float]:
+    """The places about `focus` between which the steps go on with small gaps."""
+    share = np.convolve(agrees, np.ones(7) / 7, mode="same") > 0.5
+    at = int(np.argmin(np.abs(t - focus)))
+    if not share[at]:
+        near = np.flatnonzero(share)
+        if len(near) == 0:
+            return float(t[0]), float(t[-1])
+        at = int(near[np.argmin(np.abs(near - at))])
+    gaps = np.flatnonzero(~share)
+    before, after = gaps[gaps < at], gaps[gaps > at]
+    first = int(before[-1]) + 1 if len(before) else 0
+    last = int(after[0]) - 1 if len(after) else len(t) - 1
+    return float(t[first]), float(t[last])
+
+
+def _missing(blade: Blade, normal: Array, rho: float, low: float, high: float) -> tuple[float, int]:
+    """Share of missing dots among those expected inside the line, beside the seen ones, and how many are missing beyond."""
+    direction = np.array([-normal[1], normal[0]])
+    if len(blade.absent) == 0:
+        return 0.0, 0
+    along, distance = blade.absent @ direction, blade.absent @ normal - rho
+    near = (along > low - 10) & (along < high + 10)
+    innermost = float(np.median(blade.dots @ normal)) - rho
+    gone = int((near & (distance < -PLANE_PX) & (distance > innermost)).sum())
+    there = int((blade.dots @ normal - rho > innermost).sum())
+    return gone / max(gone + there, 1), int((near & (distance > PLANE_PX) & (distance < 45)).sum())
+
+
+def _blocked(
+    profile: Profiles, blade: Blade, smooth: Image, step: Array, low: Array, high: Array, noise: float
+) -> Array:
+    """Share (k,) of the stretch beside the dots on which a step as strong as the line's own, and stronger than the blade's
+    texture, lies between the outermost dots and the line."""
+    height, width = smooth.shape
+    centre = np.array([(width - 1) / 2, (height - 1) / 2])
+    share = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES
+    places = low[:, None] + (high - low)[:, None] * share
+    inward = 4.0 + INWARD_STEP * np.arange(INWARD_SAMPLES)
+    points = profile.normal[:, None] * profile.rho[:, None, None] + places[..., None] * profile.direction[:, None]
+    u = (points[..., 0, None] - inward * profile.normal[:, 0, None, None] + centre[0]).astype(np.float32)
+    v = (points[..., 1, None] - inward * profile.normal[:, 1, None, None] + centre[1]).astype(np.float32)
+    values = cv2.remap(
+        smooth,
+        u.reshape(-1, INWARD_SAMPLES),
+        v.reshape(-1, INWARD_SAMPLES),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    ).reshape(u.shape)
+    values = cv2.blur(values.reshape(len(u), -1), (1, 1)).reshape(u.shape).astype(np.float32)
+    change = np.abs(values[..., 2:] - values[..., :-2])
+    depth = profile.rho[:, None] - np.quantile(blade.dots @ profile.normal.T, 0.85, axis=0)[:, None]
+    within = inward[1:-1] < np.maximum(depth - 3, 0)
+    strongest = np.where(within[:, None], change, 0).max(axis=2)
+    threshold = np.maximum(np.maximum(0.5 * step, 1.3 * blade.texture), 2.5 * noise)
+    return np.asarray((strongest > threshold[:, None]).mean(axis=1), float)
+
+
+def _parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noise: float) -> Array:
+    """Share (k,) of the agreeing places whose step the other eye sees where the blade's surface puts it.
+
+    0.8 where the line's parallax against the far background is too small to tell them apart.
+    """
+    stereo, surface = other.stereo, other.surface
+    height, width = other.smooth.shape
+    lines, places = profile.t.shape
+    points = (profile.normal * profile.rho[:, None])[:, None] + profile.t[..., None] * profile.direction[:, None]
+    across = np.arange(-5, 6, dtype=float)
+    rays = stereo.left.rays((points + stereo.left.centre).reshape(-1, 2))
+    inverse = np.clip((1 - rays[:, 1:] @ surface.slope) / surface.depth_m, 0.02, 1.5)
+    there = stereo.right.project((rays / inverse[:, None]) @ stereo.rotation.T + stereo.translation)
+    far = stereo.right.project(rays @ stereo.rotation.T)
+    shift = ((there - far).reshape(lines, places, 2) * profile.normal[:, None]).sum(axis=2)
+    telling = np.abs(shift).mean(axis=1) > 6.0
+    there = there.reshape(lines, places, 2)
+    u = (there[..., 0, None] + across * profile.normal[:, 0, None, None]).astype(np.float32)
+    v = (there[..., 1, None] + across * profile.normal[:, 1, None, None]).astype(np.float32)
+    values = cv2.remap(
+        other.smooth,
+        u.reshape(-1, len(across)),
+        v.reshape(-1, len(across)),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    ).reshape(u.shape)
+    gradient = values[..., 2:].astype(np.float32) - values[..., :-2].astype(np.float32)
+    gradient = (gradient + np.roll(gradient, 1, 1) + np.roll(gradient, -1, 1)) / 3
+    seen = (u[..., 5] > 4) & (v[..., 5] > 4) & (u[..., 5] < width - 5) & (v[..., 5] < height - 5)
+    seen &= profile.agrees & beside
+    like = gradient * np.sign(profile.step)[..., None]
+    strong = like.max(axis=2) > np.maximum(0.4 * np.abs(profile.step), 1.2 * noise)
+    share = (strong & seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
+    return np.asarray(np.where(telling & (seen.sum(axis=1) >= 8), share, 0.8), float)
