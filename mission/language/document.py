@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from mission.language.diagnostics import MissionFileError as MissionFileError
 from mission.language.location import NOWHERE, Location
 
 if TYPE_CHECKING:
@@ -27,10 +28,11 @@ History = Literal["shallow", "deep"]
 class Transition:
     """What an event leads to. `source` is the state that declares it ("" for the mission's own `on`).
 
-    target: absolute dotted path. when, unless: guards. after_s: it is taken so many seconds after its event, if the state
-    is still active and the guards still hold then. retries: how often it may be taken in a run; used up, it passes the
-    event on. backoff_s: wait before the second, third, … time: once, twice, four times as long. history: enter the target
-    where it was left. confirm: with autonomy `confirm` the operator is asked. index: place among the entries of its event.
+    target: absolute dotted path. when, unless: guards. after_s: it is taken so many seconds after its event, if the
+    state is still active and the guards still hold then. retries: how often it may be taken in a run; used up, it
+    passes the event on. backoff_s: wait before the second, third, … time: once, twice, four times as long. history:
+    enter the target where it was left. confirm: with autonomy `confirm` the operator is asked. index: place among the
+    entries of its event.
     """
 
     event: str
@@ -147,8 +149,8 @@ def enclosing(path: str) -> Iterator[str]:
 def load(path: Path | str, overrides: Sequence[str] = (), rig: str | None = None) -> Mission:
     """Read, resolve and check a mission file.
 
-    overrides: `a.b=value`, addressed to the resolved document. rig: a rig file instead of the mission's own, relative to
-    the working folder.
+    overrides: `a.b=value`, addressed to the resolved document. rig: a rig file instead of the mission's own, relative
+    to the working folder.
 
     Raises:
         MissionFileError: with every diagnostic found; each prints as `file:line:column: CODE message`.

@@ -1,7 +1,7 @@
 """Everywhere a mission can get to: every leaf it can be in, on the ground or in the air, and every step between them.
 
-Guards are taken as free, retries as used up or not, and history as any place that was reached: more is explored than can
-happen, never less. Whether the vehicle flies follows from the behaviours that take it up and down.
+Guards are taken as free, retries as used up or not, and history as any place that was reached: more is explored than
+can happen, never less. Whether the vehicle flies follows from the behaviours that take it up and down.
 """
 
 from __future__ import annotations
@@ -113,7 +113,8 @@ class Exploration:
 
     @cached_property
     def retreat(self) -> frozenset[str]:
-        """Leaves on the way out: entered on abort, or after it, and from which the mission can no longer be completed."""
+        """Leaves on the way out: entered on abort, or after it, and from which the mission can no longer be
+        completed."""
         hopeful = {situation.leaf for situation in self.reaching(self.finals("completed"))}
         entered = {edge.target for edge in self.all_edges() if edge.transition.event == "abort"}
         waiting, found = deque(entered), set(entered)

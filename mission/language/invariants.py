@@ -1,4 +1,5 @@
-"""Statements that a mission makes about itself and that `mission prove` holds it to: `never:` and `always_eventually:`."""
+"""Statements that a mission makes about itself and that `mission prove` holds it to: `never:` and
+`always_eventually:`."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ KINDS: tuple[Kind, ...] = ("never", "always_eventually")
 
 @dataclass(frozen=True)
 class Invariant:
-    """never: no reachable situation makes the statement true. always_eventually: from every reachable situation, whatever
-    happens, one that makes it true is reached."""
+    """never: no reachable situation makes the statement true. always_eventually: from every reachable situation,
+    whatever happens, one that makes it true is reached."""
 
     kind: Kind
     statement: Condition

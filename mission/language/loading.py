@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +52,8 @@ _WORLDLESS = ("hardware", "recorded")
 
 @dataclass(frozen=True)
 class Examination:
-    """What reading a mission file gave: the mission where there is one, and every finding, in the order of the lines."""
+    """What reading a mission file gave: the mission where there is one, and every finding, in the order of the
+    lines."""
 
     mission: Mission | None
     diagnostics: tuple[Diagnostic, ...]
@@ -86,6 +87,10 @@ def examine(path: Path, overrides: Sequence[str] = (), rig: str | None = None) -
 
         problems.extend(check(mission))
     findings = _silenced(problems, sources.allowed)
+    if mission is not None:
+        silenced = sorted({finding.code for finding in problems} - {finding.code for finding in findings})
+        header = f"# allow in this file: {', '.join(silenced)}\n" if silenced else ""
+        mission = replace(mission, resolved_yaml=header + mission.resolved_yaml)
     return Examination(None if _errors(findings) else mission, findings)
 
 
@@ -267,21 +272,22 @@ def _silenced(problems: Sequence[Diagnostic], allowed: dict[str, dict[int, tuple
     used: set[tuple[str, int, str]] = set()
     for finding in dict.fromkeys(problems):
         place = finding.location
-        codes = allowed.get(place.file, {}).get(place.line, ())
+        lines = allowed.get(place.file, {})
+        codes = (*lines.get(place.line, ()), *lines.get(0, ()))
         if finding.code in codes and CODES[finding.code].allowed:
             used.add((place.file, place.line, finding.code))
         else:
             kept.append(finding)
     failed_early = _errors(kept)
-    for file, lines in allowed.items():
-        for line, codes in lines.items():
-            for code in codes:
-                place = Location(file, line, 1)
+    for file, asked in allowed.items():
+        for line, names in asked.items():
+            for code in names:
+                place = Location(file, max(line, 1), 1)
                 if code not in CODES:
                     hint = near_or_choices(code, CODES)
                     kept.append(Diagnostic(place, "M108", f"allow: there is no code {code!r}", hint))
                 elif not CODES[code].allowed:
                     kept.append(Diagnostic(place, "M108", f"allow: {code} cannot be silenced", CODES[code].text))
-                elif (file, line, code) not in used and not failed_early:
+                elif line and (file, line, code) not in used and not failed_early:
                     kept.append(Diagnostic(place, "M108", f"allow: nothing on this line raises {code}", "remove it"))
     return tuple(sorted(kept, key=lambda finding: (finding.location, finding.level is Level.WARNING, finding.code)))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, order=True)
 class Location:
-    """A place in a file, counted from 1. For a value given on the command line `file` is that argument and `line` is 0."""
+    """A place in a file, counted from 1. For a value given on the command line `file` is that argument and `line` is
+    0."""
 
     file: str
     line: int

@@ -1,4 +1,5 @@
-"""`${name}`: values that stand in `parameters` and are used elsewhere. The nearest `parameters` around the place counts."""
+"""`${name}`: values that stand in `parameters` and are used elsewhere. The nearest `parameters` around the place
+counts."""
 
 from __future__ import annotations
 

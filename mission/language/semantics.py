@@ -1,15 +1,15 @@
 """What an event does to a configuration: the rules of the hierarchical machine, pure and synchronous.
 
-The executive, the proof, the scenario tests and the replay all rest on these functions, so that what was proven and tested
-is what flies.
+The executive, the proof, the scenario tests and the replay all rest on these functions, so that what was proven and
+tested is what flies.
 
-- The innermost active state with an entry for the event answers first, then those around it, then the mission's own `on`;
-  where none answers, the event that it falls back to is tried in the same way.
+- The innermost active state with an entry for the event answers first, then those around it, then the mission's own
+  `on`; where none answers, the event that it falls back to is tried in the same way.
 - Of several entries for one event the first whose guards hold and whose retries are not used up is taken.
-- A transition leaves every state up to the one that holds both the active leaf and the target, and enters the target anew;
-  a target that is active, or around the active leaf, is left and entered again.
-- On being left, each composite remembers the leaf that was active in it. A transition with `history: deep` enters its target
-  there; with `shallow`, in the same child of the target, entered afresh.
+- A transition leaves every state up to the one that holds both the active leaf and the target, and enters the target
+  anew; a target that is active, or around the active leaf, is left and entered again.
+- On being left, each composite remembers the leaf that was active in it. A transition with `history: deep` enters its
+  target there; with `shallow`, in the same child of the target, entered afresh.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def answers(
 ) -> Iterator[Transition]:
     """Transitions that could answer the event now, in the order in which they are tried, guards left open.
 
-    origin: the state that the event is about, where it is not the leaf: the deadline of a composite, for instance. It ends
-    after the first unguarded one, which always answers.
+    origin: the state that the event is about, where it is not the leaf: the deadline of a composite, for instance. It
+    ends after the first unguarded one, which always answers.
     """
     for transition in mission.handlers(origin or configuration.leaf, event):
         if used_up(transition, configuration):

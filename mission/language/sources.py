@@ -1,4 +1,5 @@
-"""Reads a mission's files and puts them together: `extends` and `include`, every place kept, no path leading outside."""
+"""Reads a mission's files and puts them together: `extends` and `include`, every place kept, no path leading
+outside."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ class Sources:
         return self._read(path, asked, ())
 
     def named(self, scalar: Scalar, folder: Path) -> Path | None:
-        """The file that a value names, seen from the folder of the file it stands in; None with a finding if unusable."""
+        """The file that a value names, seen from the folder of the file it stands in; None with a finding if
+        unusable."""
         if not isinstance(scalar.value, str) or not scalar.value.strip():
             self.problems.append(Diagnostic(scalar.location, "M203", "the name of a file is expected here"))
             return None

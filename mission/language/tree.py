@@ -14,8 +14,8 @@ Step = str | int
 
 @dataclass(frozen=True)
 class Scalar:
-    """A single value. used_at: where a reference put it, if it came from a parameter. offset: columns between `location`
-    and the first character of its text (1 within quotes)."""
+    """A single value. used_at: where a reference put it, if it came from a parameter. offset: columns between
+    `location` and the first character of its text (1 within quotes)."""
 
     value: Plain
     location: Location

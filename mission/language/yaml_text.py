@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import yaml
 
@@ -19,16 +20,19 @@ DEEPEST = 40
 
 _INTEGER = re.compile(r"[-+]?\d+")
 _FLOAT = re.compile(r"[-+]?(\.\d+|\d+(\.\d*)?)([eE][-+]?\d+)?")
-_SPECIAL = {"": None, "~": None, "null": None, "Null": None, "NULL": None} | dict.fromkeys(
-    ("true", "True", "TRUE"), True
-)
-_SPECIAL |= dict.fromkeys(("false", "False", "FALSE"), False)
-_SPECIAL |= dict.fromkeys((".inf", ".Inf", "+.inf"), float("inf")) | {"-.inf": float("-inf"), ".nan": float("nan")}
+_SPECIAL: dict[str, Plain] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".inf", ".Inf", "+.inf"), float("inf")),
+    "-.inf": float("-inf"),
+    ".nan": float("nan"),
+}
 _CONTROL = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
 )
 _INDENT_TAB = re.compile(r"^[ ]*\t\s*[^\s#]", re.MULTILINE)
-_ALLOW = re.compile(r"#\s*allow:\s*(?P<codes>\w+(?:\s*,\s*[A-Z]\w*)*)")
+_ALLOW = re.compile(r"#\s*allow(?P<everywhere> in this file)?:\s*(?P<codes>\w+(?:\s*,\s*[A-Z]\w*)*)")
 
 # The C parser is ten times faster; a build of PyYAML without libyaml still works.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -72,11 +76,12 @@ def parse_value(text: str, file: str) -> Node:
 
 
 def allowances(text: str) -> dict[int, tuple[str, ...]]:
-    """Line → codes that `# allow: CODE` on it wants silenced."""
+    """Line → codes that `# allow: CODE` on it wants silenced; under 0 those of `# allow in this file: CODE`."""
     found: dict[int, tuple[str, ...]] = {}
     for number, line in enumerate(text.splitlines(), 1):
         if "#" in line and (match := _ALLOW.search(line)):
-            found[number] = tuple(re.split(r"\s*,\s*", match["codes"]))
+            line_number = 0 if match["everywhere"] else number
+            found[line_number] = (*found.get(line_number, ()), *re.split(r"\s*,\s*", match["codes"]))
     return found
 
 
@@ -127,7 +132,8 @@ class _Open:
 
 
 class _Builder:
-    """Builds the tree from parser events: iterative, so that deep nesting meets a limit and not the end of the stack."""
+    """Builds the tree from parser events: iterative, so that deep nesting meets a limit and not the end of the
+    stack."""
 
     def __init__(self, file: str, problems: list[Diagnostic], lines: bool = True) -> None:
         self.file = file
@@ -164,7 +170,8 @@ class _Builder:
             raise self.stop(Location(self.file, 1, 1), "M002", str(error).splitlines()[0]) from None
 
     def syntax(self, error: yaml.MarkedYAMLError, text: str) -> UnreadableError:
-        # An unclosed bracket or quote, or a key without colon, is noticed lines later: the context knows where it began.
+        # An unclosed bracket or quote, or a key without colon, is noticed lines later: the context knows where it
+        # began.
         context, problem = error.context or "", error.problem or "not YAML"
         began = any(word in context for word in ("flow", "quoted", "simple key", "anchor", "alias"))
         mark = error.context_mark if began and error.context_mark else error.problem_mark or error.context_mark
@@ -179,7 +186,7 @@ class _Builder:
             )
         return self.stop(place, "M002", f"{context + ': ' if context else ''}{problem}")
 
-    def place(self, mark: yaml.Mark | None) -> Location:
+    def place(self, mark: Any) -> Location:
         if not self.lines:
             return Location(self.file, 0, 0)
         return Location(self.file, mark.line + 1, mark.column + 1) if mark else Location(self.file, 1, 1)

@@ -24,7 +24,8 @@ def without_deadline(exploration: Exploration) -> Iterator[Diagnostic]:
 
 
 def unbounded_cycles(exploration: Exploration) -> Iterator[Diagnostic]:
-    """M305: cycles that can go on for ever by themselves: no retries on any of their transitions, no deadline around."""
+    """M305: cycles that can go on for ever by themselves: no retries on any of their transitions, no deadline
+    around."""
     edges = [edge for edge in exploration.all_edges() if edge.automatic and edge.transition.retries is None]
     after: dict[Situation, list[Situation]] = {}
     step: dict[tuple[Situation, Situation], Edge] = {}

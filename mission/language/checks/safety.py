@@ -13,8 +13,8 @@ from mission.language.exploration import Exploration, Situation, behaviour_of, h
 def unanswered_events(exploration: Exploration) -> Iterator[Diagnostic]:
     """M307: safety events for which an airborne state has no answer that holds without conditions.
 
-    On the way out only failures, deadlines and the pilot need one: what else happens cannot make the vehicle do more than
-    leave. Findings about all states inside a composite are reported once, at the composite.
+    On the way out only failures, deadlines and the pilot need one: what else happens cannot make the vehicle do more
+    than leave. Findings about all states inside a composite are reported once, at the composite.
     """
     mission = exploration.mission
     missing: dict[str, dict[str, str]] = {}

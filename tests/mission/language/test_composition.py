@@ -1,0 +1,143 @@
+"""Missions are put together from files, references and overrides, and every mistake keeps its true place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from mission.language.document import MissionFileError, load
+from mission.language.loading import examine
+from tests.mission.language.missions import MISSIONS, PREAMBLE, SMALL, STATES, examined, folder, line_of, only, written
+
+
+def test_a_mission_extends_another_and_keeps_what_it_does_not_say(tmp_path: Path) -> None:
+    written(tmp_path, SMALL, "base.yaml")
+    path = written(tmp_path, "extends: base.yaml\nmission: other\nstates: {work: {with: {for_s: 9}}}\n", "other.yaml")
+    mission = load(path)
+    assert mission.name == "other"
+    assert mission.states["work"].parameters.model_dump() == {"for_s": 9.0}
+    assert mission.states["work"].timeout_s == 60
+
+
+def test_nothing_removes_what_was_inherited(tmp_path: Path) -> None:
+    written(tmp_path, SMALL, "base.yaml")
+    path = written(tmp_path, "extends: base.yaml\nmission: other\nstates: {work: {on: {abort: ~}}}\n", "other.yaml")
+    findings = examine(path).errors
+    assert {finding.code for finding in findings} == {"M307"}
+    assert "work" in findings[0].message
+
+
+def test_a_mistake_in_an_included_file_is_reported_there(tmp_path: Path) -> None:
+    part = folder(tmp_path) / "parts" / "work.yaml"
+    part.parent.mkdir()
+    part.write_text("do: hold\n\nwith: {for_s: ten}\ntimeout_s: 60\n")
+    text = PREAMBLE + STATES.replace(
+        "work: {do: hold, with: {for_s: 5}, timeout_s: 60,", "work: {include: parts/work.yaml,"
+    )
+    finding = only(examined(tmp_path, text))
+    assert finding.location.file.endswith("work.yaml")
+    assert (finding.code, finding.location.line, finding.location.column) == ("M203", 3, 15)
+
+
+def test_files_that_include_each_other_are_refused_at_the_line_that_closes_the_circle(tmp_path: Path) -> None:
+    missions = folder(tmp_path)
+    (missions / "a.yaml").write_text("text: a\ninclude: b.yaml\n")
+    (missions / "b.yaml").write_text("text: b\n\ninclude: a.yaml\n")
+    findings = examine(missions / "a.yaml").diagnostics
+    circle = [finding for finding in findings if finding.code == "M102"]
+    assert [(Path(one.location.file).name, one.location.line) for one in circle] == [("b.yaml", 3)]
+
+
+def test_a_reference_takes_the_parameter_with_its_type(tmp_path: Path) -> None:
+    text = SMALL.replace("for_s: 5", 'for_s: "${wait_s}"').replace(
+        "initial: pre", "parameters: {wait_s: 7}\ninitial: pre"
+    )
+    mission = load(written(tmp_path, text))
+    assert mission.states["work"].parameters.model_dump() == {"for_s": 7.0}
+
+
+def test_a_wrong_parameter_is_reported_where_it_is_defined_and_names_where_it_is_used(tmp_path: Path) -> None:
+    text = SMALL.replace("for_s: 5", 'for_s: "${wait_s}"').replace(
+        "initial: pre", "parameters:\n  wait_s: -7\ninitial: pre"
+    )
+    finding = only(examined(tmp_path, text))
+    assert (finding.code, finding.location.line) == ("M204", line_of(text, "wait_s: -7"))
+    assert f"small.yaml:{line_of(text, '${wait_s}')}" in finding.message
+
+
+def test_parameters_belong_to_the_nearest_state_around(tmp_path: Path) -> None:
+    text = SMALL.replace(
+        "work: {do: hold, with: {for_s: 5}", 'work: {parameters: {wait_s: 3}, do: hold, with: {for_s: "${wait_s}"}'
+    )
+    text = text.replace("initial: pre", "parameters: {wait_s: 7, height_m: 9}\ninitial: pre")
+    text = text.replace("do: take_off,", 'do: take_off, with: {height_m: "${height_m}"},')
+    examination = examined(tmp_path, text)
+    assert examination.mission is not None
+    assert examination.mission.states["work"].parameters.model_dump() == {"for_s": 3.0}
+    assert [(finding.code, "wait_s" in finding.message) for finding in examination.diagnostics] == [("M107", True)]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "code"),
+    [("{a_s: '${b_s}', b_s: '${a_s}'}", "M105"), ("{c_s: 1}", "M104"), ("{a_s: '${missing}'}", "M104")],
+)
+def test_references_to_nothing_and_in_circles_are_refused(tmp_path: Path, parameters: str, code: str) -> None:
+    text = SMALL.replace("for_s: 5", 'for_s: "${a_s}"').replace(
+        "initial: pre", f"parameters: {parameters}\ninitial: pre"
+    )
+    assert code in {finding.code for finding in examined(tmp_path, text).errors}
+
+
+def test_an_override_changes_the_resolved_document() -> None:
+    mission = load(
+        MISSIONS / "v80_blade.yaml",
+        ["turbine.azimuth_deg=90", "world.wind.mean_m_s=8", "world.faults.images.every_s=20", "rig.speed=2"],
+    )
+    assert mission.turbine.azimuth_deg == 90 and mission.rig.speed == 2
+    assert mission.world is not None and mission.world.wind.mean_m_s == 8
+    assert mission.world.faults.images is not None and mission.world.faults.images.every_s == 20
+
+
+@pytest.mark.parametrize(
+    ("override", "code", "hint"),
+    [
+        ("turbine.azimut_deg=90", "M202", "azimuth_deg"),
+        ("turbine.azimuth_deg=north", "M203", ""),
+        ("world.wind.mean_m_s=800", "M204", ""),
+        ("wrld.wind.mean_m_s=8", "M106", "world"),
+        ("states.launsh.timeout_s=8", "M106", "launch"),
+        ("turbine.azimuth_deg", "M106", ""),
+        ("limits.clearance_m=[", "M106", ""),
+        ("rig=rigs/simulated.yaml", "M106", "--rig"),
+        ("states.launch.on.done=nowhere", "M212", ""),
+    ],
+)
+def test_a_wrong_override_is_blamed_by_its_own_text(override: str, code: str, hint: str) -> None:
+    with pytest.raises(MissionFileError) as caught:
+        load(MISSIONS / "v80_blade.yaml", [override])
+    line = str(caught.value)
+    assert line.startswith(f"--set {override}: {code} ") and hint in line and "\n" not in line
+
+
+def test_what_is_recorded_is_what_was_flown(tmp_path: Path) -> None:
+    mission = load(MISSIONS / "v80_blade.yaml", ["parameters.speed_m_s=1.1", "world.seed=7"])
+    path = tmp_path / "mission.yaml"
+    path.write_text(mission.resolved_yaml)
+    again = load(path)
+    assert yaml.safe_load(again.resolved_yaml) == yaml.safe_load(mission.resolved_yaml)
+    assert (again.turbine, again.rig, again.site, again.world, again.limits) == (
+        mission.turbine, mission.rig, mission.site, mission.world, mission.limits,
+    )  # fmt: skip
+    assert [(s.path, s.do, s.parameters, s.timeout_s) for s in again.states.values()] == [
+        (s.path, s.do, s.parameters, s.timeout_s) for s in mission.states.values()
+    ]
+
+
+def test_a_newer_format_is_refused_and_an_older_one_brought_up_to_date(tmp_path: Path) -> None:
+    newer = only(examined(tmp_path, SMALL.replace("version: 1", "version: 2")))
+    assert (newer.code, newer.location.line) == ("M206", 2)
+    old = SMALL.replace("version: 1", "version: 0").replace("timeout_s", "timeout")
+    mission = load(written(tmp_path, old, "old.yaml"))
+    assert mission.version == 1 and mission.states["launch"].timeout_s == 60
