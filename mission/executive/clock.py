@@ -1,4 +1,4 @@
-"""Time, in one place: wall time scaled by the simulation's speed, and lockstep time in which sleeping advances the world."""
+"""Time, in one place: wall time scaled by the simulation's speed, and lockstep time, in which sleeping moves the world."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import selectors
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any, Protocol, TypeVar
 
 T = TypeVar("T")
@@ -26,7 +27,7 @@ class Clock(Protocol):
         ...
 
     async def work(self, function: Callable[..., T], *arguments: Any) -> T:
-        """Run a blocking function beside the event loop (wall time), or at once (lockstep time), and return its result."""
+        """Run a blocking function beside the event loop (wall time), or at once (lockstep time); return its result."""
         ...
 
     def close(self) -> None:
@@ -59,9 +60,9 @@ class WallClock:
 class LockstepLoop(asyncio.SelectorEventLoop):
     """An event loop whose time is the simulated world's: when every task waits, the world moves to the next deadline.
 
-    `advance(seconds)` moves the world; it is called with the time to the next timer. Anything that reads sockets or threads
-    would make a run depend on the machine, so nothing here waits for them: a loop with no timer and nothing ready is stuck
-    and raises RuntimeError rather than hang.
+    `advance(seconds)` moves the world; it is called with the time to the next timer. Anything that reads sockets or
+    threads would make a run depend on the machine, so nothing here waits for them: a loop with no timer and nothing
+    ready is stuck and raises RuntimeError rather than hang.
     """
 
     def __init__(self, advance: Callable[[float], None] = lambda seconds: None) -> None:
@@ -97,22 +98,34 @@ class _LockstepSelector(selectors.DefaultSelector):
 
 
 class LockstepClock:
-    """Mission time of a LockstepLoop: deterministic, as fast as the machine allows."""
+    """Mission time of a LockstepLoop: deterministic, as fast as the machine allows.
+
+    It belongs to the loop that first asks it; others, such as a view in its own thread, may read it at any time.
+    """
 
     speed = 1.0
 
     def __init__(self, start_s: float = 0.0) -> None:
         self._start_s = start_s
+        self._loop: asyncio.AbstractEventLoop | None = None
 
     def now(self) -> float:
-        return self._start_s + asyncio.get_running_loop().time()
+        loop = self._bound()
+        return self._start_s + (0.0 if loop is None else loop.time())
 
     async def sleep(self, seconds: float) -> None:
+        self._bound()
         await asyncio.sleep(max(seconds, 0.0))
 
     async def work(self, function: Callable[..., T], *arguments: Any) -> T:
         await asyncio.sleep(0)
         return function(*arguments)
+
+    def _bound(self) -> asyncio.AbstractEventLoop | None:
+        if self._loop is None:
+            with suppress(RuntimeError):
+                self._loop = asyncio.get_running_loop()
+        return self._loop
 
     def close(self) -> None:
         """Nothing to stop."""
