@@ -8,6 +8,10 @@ def schema() -> None:
 
     It ships as mission/language/mission.schema.json: a first line such as
     `# yaml-language-server: $schema=../mission/language/mission.schema.json` makes an editor complete and check.
+
+    \b
+    Examples:
+      mission schema > mission.schema.json
     """
     from mission.language.schema import schema_text
 
