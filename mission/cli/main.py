@@ -11,6 +11,7 @@ import importlib
 import re
 import sys
 from collections.abc import Callable, Sequence
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -126,6 +127,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program and return its exit code. Every error is a line for a person; a traceback goes to a file."""
     from mission.cli.errors import explain
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that knows only ASCII gets question marks, not an error
     command = typer.main.get_command(app)
     try:
         code = command.main(

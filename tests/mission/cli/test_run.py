@@ -1,0 +1,168 @@
+"""`mission run`: what it refuses before anything flies, what it leaves behind, and how it ends."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mission.executive import assembly
+from mission.executive.assembly import FlightError, FlightOptions, FlightResult
+from mission.record.folder import RunFolder
+from tests.mission.cli.conftest import Call
+from tests.mission.cli.program import ROOT
+from tests.mission.record.synthetic_run import write_journal
+
+BLADE = ROOT / "missions" / "v80_blade.yaml"
+
+Fly = Callable[[FlightOptions], FlightResult]
+
+
+@pytest.fixture
+def flights(monkeypatch: pytest.MonkeyPatch) -> Callable[[Fly], list[FlightOptions]]:
+    """Replace the flight by a function; returns what each flight was asked to do."""
+
+    def use(fly: Fly) -> list[FlightOptions]:
+        asked: list[FlightOptions] = []
+
+        def noted(options: FlightOptions) -> FlightResult:
+            asked.append(options)
+            return fly(options)
+
+        monkeypatch.setattr(assembly, "fly", noted)
+        return asked
+
+    return use
+
+
+def ends(outcome: str, interrupted: bool = False) -> Fly:
+    def fly(options: FlightOptions) -> FlightResult:
+        write_journal(options.folder)
+        text = options.folder.journal.read_text().replace('"outcome": "completed"', f'"outcome": "{outcome}"')
+        options.folder.journal.write_text(text)
+        return FlightResult(outcome, outcome, interrupted)
+
+    return fly
+
+
+@pytest.mark.parametrize(
+    ("outcome", "interrupted", "code"),
+    [
+        ("completed", False, 0),
+        ("aborted", False, 1),
+        ("released", False, 1),
+        ("refused", False, 3),
+        ("aborted", True, 130),
+    ],
+)
+def test_the_exit_code_says_how_it_ended(
+    call: Call, flights: Any, tmp_path: Path, outcome: str, interrupted: bool, code: int
+) -> None:
+    flights(ends(outcome, interrupted))
+    said = call("run", BLADE, "--record", tmp_path, "--headless")
+    assert said.code == code
+    assert said.err == ""
+    (folder,) = tmp_path.iterdir()
+    assert json.loads((folder / "summary.json").read_text())["outcome"] == outcome
+    assert (folder / "report.html").is_file()
+    assert str(folder) in said.out
+    assert said.out.count(outcome) >= 1
+
+
+def test_the_resolved_mission_lies_in_the_folder_before_the_flight_begins(
+    call: Call, flights: Any, tmp_path: Path
+) -> None:
+    seen: list[str] = []
+
+    def fly(options: FlightOptions) -> FlightResult:
+        seen.append(options.folder.mission.read_text())
+        return ends("completed")(options)
+
+    flights(fly)
+    call("run", BLADE, "--record", tmp_path, "--set", "turbine.azimuth_deg=123.5", "--seed", "77")
+    assert "123.5" in seen[0]
+    assert "seed: 77" in seen[0]
+
+
+def test_what_was_asked_reaches_the_flight(call: Call, flights: Any, tmp_path: Path) -> None:
+    asked = flights(ends("completed"))
+    call("run", BLADE, "--record", tmp_path, "--speed", "2", "--autonomy", "confirm", "--system", "udpin://127.0.0.1:1")
+    call("run", BLADE, "--record", tmp_path, "--lockstep")
+    assert (asked[0].speed, asked[0].autonomy, asked[0].system) == (2.0, "confirm", "udpin://127.0.0.1:1")
+    assert (asked[0].lockstep, asked[0].resume) == (False, None)
+    assert asked[1].lockstep
+
+
+def test_a_flight_that_cannot_begin_is_one_line_and_leaves_no_folder(call: Call, flights: Any, tmp_path: Path) -> None:
+    def fly(options: FlightOptions) -> FlightResult:
+        raise FlightError("no vehicle answered at udpin://0.0.0.0:14540 within 20 s; is it switched on?")
+
+    flights(fly)
+    said = call("run", BLADE, "--record", tmp_path / "logs")
+    said.assert_one_line(3)
+    assert "no vehicle answered" in said.err
+    assert list((tmp_path / "logs").iterdir()) == []
+
+
+def test_a_crash_is_one_line_with_its_traceback_in_the_run_s_folder(call: Call, flights: Any, tmp_path: Path) -> None:
+    def fly(options: FlightOptions) -> FlightResult:
+        write_journal(options.folder, until_s=60.0)
+        raise ZeroDivisionError("of all things")
+
+    flights(fly)
+    said = call("run", BLADE, "--record", tmp_path)
+    assert said.code == 1
+    assert said.err.count("\n") == 1
+    (folder,) = tmp_path.iterdir()
+    assert str(folder / "error.txt") in said.err
+    assert "Traceback" in (folder / "error.txt").read_text()
+
+
+def test_an_interrupted_run_is_found_by_its_name(call: Call, flights: Any, tmp_path: Path) -> None:
+    asked = flights(ends("aborted", True))
+    call("run", BLADE, "--record", tmp_path)
+    call("run", "--resume", "latest", "--record", tmp_path)
+    assert isinstance(asked[1].folder, RunFolder)
+    assert asked[1].resume == asked[0].folder.path
+    assert asked[1].mission.name == "v80_blade"
+
+
+def a_real_rig(tmp_path: Path) -> Path:
+    rig = tmp_path / "drone.yaml"
+    rig.write_text(
+        "kind: hardware\nsystem: serial:///dev/ttyACM0:921600\nspeed: 1.0\n"
+        "camera: {width: 612, height: 512, focal_px: 616.0, baseline_m: 0.2}\n"
+    )
+    return rig
+
+
+def test_a_real_vehicle_is_not_armed_without_a_yes(call: Call, flights: Any, tmp_path: Path) -> None:
+    asked = flights(ends("completed"))
+    said = call("run", BLADE, "--rig", a_real_rig(tmp_path), "--record", tmp_path / "logs")
+    said.assert_one_line(2)
+    assert "--yes" in said.err
+    assert asked == []
+    assert not (tmp_path / "logs").exists()
+
+
+def test_yes_on_the_command_line_is_a_yes(call: Call, flights: Any, tmp_path: Path) -> None:
+    asked = flights(ends("completed"))
+    said = call("run", BLADE, "--rig", a_real_rig(tmp_path), "--record", tmp_path / "logs", "--yes")
+    assert said.code == 0
+    assert asked[0].confirm("Arm the vehicle?")
+
+
+def test_without_yes_nobody_answers_for_the_operator(call: Call, flights: Any, tmp_path: Path) -> None:
+    asked = flights(ends("completed"))
+    call("run", BLADE, "--record", tmp_path)
+    assert not asked[0].confirm("Arm the vehicle?")
+
+
+def test_a_real_vehicle_does_not_fly_faster_than_time(call: Call, flights: Any, tmp_path: Path) -> None:
+    flights(ends("completed"))
+    rig = a_real_rig(tmp_path)
+    call("run", BLADE, "--rig", rig, "--record", tmp_path / "logs", "--yes", "--speed", "4").assert_one_line(2)
+    call("run", BLADE, "--rig", rig, "--record", tmp_path / "logs", "--yes", "--lockstep").assert_one_line(2)
