@@ -303,11 +303,14 @@ def moved(image: Image, shift: tuple[float, float]) -> Image:
     """A copy of an image, its content moved by so many pixels right and down."""
     if max(abs(shift[0]), abs(shift[1])) < 0.02:
         return image.copy()
-    matrix = np.array([[1.0, 0.0, shift[0]], [0.0, 1.0, shift[1]]])
-    size = (image.shape[1], image.shape[0])
-    return np.asarray(
-        cv2.warpAffine(image, matrix, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.uint8
-    )
+    height, width = image.shape[:2]
+    right, down = int(np.floor(shift[0])), int(np.floor(shift[1]))
+    across, along = np.array([shift[0] - right, 1 - shift[0] + right]), np.array([shift[1] - down, 1 - shift[1] + down])
+    soft = cv2.sepFilter2D(image, -1, across, along, anchor=(1, 1), borderType=cv2.BORDER_REPLICATE)
+    right, down = int(np.clip(right, 1 - width, width - 1)), int(np.clip(down, 1 - height, height - 1))
+    kept = soft[max(-down, 0) : height - max(down, 0), max(-right, 0) : width - max(right, 0)]
+    sides = (max(down, 0), max(-down, 0), max(right, 0), max(-right, 0))
+    return np.asarray(cv2.copyMakeBorder(kept, *sides, cv2.BORDER_REPLICATE), np.uint8)
 
 
 def smeared(image: Image, path: tuple[float, float]) -> Image:
