@@ -315,7 +315,7 @@ class Executive:
             self._watcher.rearm(name)
         self._ignored.clear()
         self._recent.append(Recent(now, queued.name, step.after.leaf))
-        self.services.log.info("transition", event=queued.name, state=step.after.leaf, t=round(now, 3))
+        self.services.log.info("transition", by=queued.name, state=step.after.leaf, t=round(now, 3))
         await self._begin()
         if self._gate.let_go and self._ended is None:
             self._ended = "released"
@@ -357,7 +357,7 @@ class Executive:
         """Nobody answers. A limit is watched again in the next state; a behaviour's last word must not be lost."""
         self._ignored.add(queued.name)
         self._recent.append(Recent(self._clock.now(), queued.name, "ignored"))
-        self.services.log.warning("event without answer", event=queued.name, state=self._machine.state)
+        self.services.log.warning("event without answer", name=queued.name, state=self._machine.state)
         telemetry = self._autopilot.telemetry
         if event(queued.name).lets_go:
             self._ended = "released"
