@@ -1,4 +1,4 @@
-"""Time, in one place: wall time scaled by the simulation's speed, and lockstep time, in which sleeping moves the world."""
+"""Time, in one place: wall time, scaled for simulation, and lockstep time, in which sleeping moves the world."""
 
 from __future__ import annotations
 
