@@ -58,6 +58,8 @@ class CommandHandler:
             mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
             mavlink.MAV_CMD_NAV_LAND: lambda command: self._vehicle.set_mode("LAND"),
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda command: self._vehicle.set_mode("RTL"),
+            mavlink.MAV_CMD_NAV_LOITER_UNLIM: lambda command: self._vehicle.set_mode("HOLD"),
+            mavlink.MAV_CMD_MISSION_START: lambda command: self._vehicle.set_mode("MISSION"),
             mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
             mavlink.MAV_CMD_RUN_PREARM_CHECKS: lambda command: Result.ACCEPTED,

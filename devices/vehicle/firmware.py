@@ -125,7 +125,7 @@ class Firmware:
         return Result.ACCEPTED
 
     def take_off(self, down_m: float | None = None) -> Result:
-        """TAKEOFF mode toward a local height (NED down), or to MIS_TAKEOFF_ALT above home."""
+        """TAKEOFF mode toward a local height (NED down); at least, and without one, to MIS_TAKEOFF_ALT above home."""
         self._take_off_down = down_m
         return self.set_mode(Mode.TAKEOFF)
 
@@ -344,9 +344,8 @@ class Firmware:
         self.mode = mode
         estimate = self._estimate
         if mode is Mode.TAKEOFF:
-            down = self._take_off_down
-            if down is None:
-                down = self.flight.home[2] - float(self.parameters["MIS_TAKEOFF_ALT"])
+            least = self.flight.home[2] - float(self.parameters["MIS_TAKEOFF_ALT"])
+            down = least if self._take_off_down is None else min(self._take_off_down, least)
             self._flying = TakeOff(estimate, down if self.landed else min(down, estimate.d))
         elif mode is Mode.LAND:
             self._flying = Land(estimate)
