@@ -18,7 +18,7 @@ EXPECTED = (
     ("mission.language.document", "MissionFileError", USAGE),
     ("mission.record.folder", "RunFolderError", USAGE),
     ("mission.executive.journal", "JournalError", USAGE),
-    ("mission.executive.assembly", "FlightError", REFUSED),
+    ("mission.executive.stage", "FlightError", REFUSED),
     ("flight.autopilot", "AutopilotError", REFUSED),
     ("devices.rig", "CaptureError", REFUSED),
 )

@@ -27,12 +27,12 @@ from tests.mission.cli.program import ROOT
 from tests.mission.record.synthetic_run import write_journal
 
 SCENE = Scene(
-    mission="v80_blade", state="inspect.leading", now_s=102.0, entered_s=60.0, deadline_s=300.0,
-    behaviour="follow_edge", doing="both edges in view", speed=4.0, station_m=23.4, root_m=1.0, tip_m=40.0, distance_m=3.02, sigma_m=0.03,
-    target_m=3.0, nearest_m=2.91, vision_age_s=0.2, vision_hz=4.9, battery_percent=81.0, wind_m_s=4.2,
-    wind_from_deg=200.0, mode="OFFBOARD", height_m=61.0, link_age_s=0.1, recording="leading",
+    mission="v80_blade", state="inspect.leading", now_s=102.0, entered_s=60.0, deadline_s=300.0, speed=4.0,
+    behaviour="follow_edge", doing="both edges in view", station_m=23.4, root_m=1.0, tip_m=40.0,
+    distance_m=3.02, sigma_m=0.03, target_m=3.0, nearest_m=2.91, vision_age_s=0.2, vision_hz=4.9,
+    battery_percent=81.0, wind_m_s=4.2, wind_from_deg=200.0, mode="OFFBOARD", height_m=61.0, link_age_s=0.1,
+    recording="leading", events=((60.0, "found → inspect.leading"),),
     following=(Next("tip_detected", "inspect.confirm_tip"), Next("paused", "holding", "needs battery_percent > 40")),
-    events=((60.0, "found → inspect.leading"),),
 )  # fmt: skip
 
 
