@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -38,6 +39,7 @@ def _seamless(random: np.random.Generator, beta: float) -> NDArray[np.float64]:
     return result
 
 
+@lru_cache(maxsize=4)
 def surroundings(light: Light, seed: int) -> Surroundings:
     """The tiles of a world: fields with hedges and tracks, sea with waves, or plain grey."""
     random = np.random.default_rng([seed, 2])

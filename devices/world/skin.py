@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -64,16 +66,22 @@ def _tower(random: np.random.Generator, height_m: float) -> NDArray[np.uint8]:
     return np.asarray(np.clip(dirt * 255, 0, 255), np.uint8)
 
 
-def skins(shape: TurbineShape, surface: Surface, light: Light, exposure: float, seed: int) -> Skins:
-    """Dirt and colours of every part of a turbine. The same seed gives the same marks."""
+@lru_cache(maxsize=4)
+def _marks(blade_m: float, tower_m: float, surface: Surface, seed: int) -> Mapping[int, tuple[NDArray[np.uint8], int]]:
+    """Dirt of the parts and rows a metre. Kept, for many worlds share it."""
     random = np.random.default_rng([seed, 1])
     plain = np.asarray(90 * _cloud(random, 512, 512, (24, 24)) ** 2, np.uint8)
-    maps = {
-        INSPECTED: (_blade(random, shape.blade_length_m, surface), ROWS_PER_M),
-        SECOND: (_blade(random, shape.blade_length_m, surface), ROWS_PER_M),
-        TOWER: (_tower(random, shape.hub_height_m), 20),
+    return {
+        INSPECTED: (_blade(random, blade_m, surface), ROWS_PER_M),
+        SECOND: (_blade(random, blade_m, surface), ROWS_PER_M),
+        TOWER: (_tower(random, tower_m), 20),
         NACELLE: (plain, 50),
     }
+
+
+def skins(shape: TurbineShape, surface: Surface, light: Light, exposure: float, seed: int) -> Skins:
+    """Dirt and colours of every part of a turbine. The same seed gives the same marks."""
+    maps = _marks(shape.blade_length_m, shape.hub_height_m, surface, seed)
     layout, tint = np.zeros((7, 4), np.int64), np.zeros((7, 6))
     pieces, offset = [], 0
     for part, (dirt, rows_per_m) in maps.items():
