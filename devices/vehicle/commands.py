@@ -24,13 +24,16 @@ _EARTH_YAW = mavlink.GIMBAL_MANAGER_FLAGS_YAW_LOCK | mavlink.GIMBAL_MANAGER_FLAG
 
 @dataclass(frozen=True)
 class Command:
-    """A command as received: seven numbers (latitude and longitude in degrees), and whom it came from and was meant
-    for."""
+    """A command as received: seven numbers (latitude and longitude in degrees), and whom it came from and was meant for.
+
+    above_home: the height in the seventh is above home, else above mean sea level.
+    """
 
     number: int
     p: tuple[float, float, float, float, float, float, float]
     sender: tuple[int, int]
     component: int
+    above_home: bool = False
 
 
 def command_of(message: Any) -> Command:
@@ -39,12 +42,12 @@ def command_of(message: Any) -> Command:
     four = (message.param1, message.param2, message.param3, message.param4)
     if message.get_type() == "COMMAND_LONG":
         place = (message.param5, message.param6, message.param7)
-    else:
-        local = message.frame == mavlink.MAV_FRAME_LOCAL_NED
-        scale = 1e4 if local else 1e7
-        unknown = 0x7FFFFFFF
-        place = (*(math.nan if n == unknown else n / scale for n in (message.x, message.y)), message.z)
-    return Command(message.command, (*four, *place), sender, message.target_component)
+        return Command(message.command, (*four, *place), sender, message.target_component)
+    unknown = 0x7FFFFFFF
+    latitude, longitude = (math.nan if n == unknown else n / 1e7 for n in (message.x, message.y))
+    above_home = message.frame in (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+    numbers = (*four, latitude, longitude, message.z)
+    return Command(message.command, numbers, sender, message.target_component, above_home)
 
 
 class CommandHandler:
@@ -114,14 +117,16 @@ class CommandHandler:
         return Result.UNSUPPORTED if mode is None else self._vehicle.firmware.set_mode(mode)
 
     def _take_off(self, command: Command) -> Result:
-        above_sea = command.p[6]
-        down = self._vehicle.settings.altitude_m - above_sea if math.isfinite(above_sea) else None
-        return self._vehicle.firmware.take_off(down)
+        down = self._down(command)
+        return self._vehicle.firmware.take_off(down if math.isfinite(down) else None)
 
     def _reposition(self, command: Command) -> Result:
         north, east = local_position(self._vehicle, command.p[4], command.p[5])
-        down = self._vehicle.settings.altitude_m - command.p[6]
-        return self._vehicle.firmware.reposition(north, east, down, command.p[3])
+        return self._vehicle.firmware.reposition(north, east, self._down(command), command.p[3])
+
+    def _down(self, command: Command) -> float:
+        home = self._vehicle.firmware.flight.home[2]
+        return (home if command.above_home else self._vehicle.settings.altitude_m) - command.p[6]
 
     def _terminate(self, command: Command) -> Result:
         return self._vehicle.firmware.disarm(force=True) if command.p[0] > 0.5 else Result.ACCEPTED
