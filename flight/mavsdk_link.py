@@ -1,23 +1,65 @@
-"""PX4 over MAVSDK: the Autopilot protocol on a real socket."""
+"""PX4 over MAVSDK: the Autopilot protocol on a real socket.
+
+Setpoints, gimbal angles, modes and telemetry go through MAVSDK's `mavlink_direct`, for two reasons: its offboard plugin
+re-sends the last setpoint from a thread of its own and so hides a hung program from the autopilot's failsafe, and its
+telemetry carries no time stamps, without which a picture cannot be given the pose that it was taken from.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+import asyncio
+import contextlib
+import json
+import logging
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from flight import px4_modes
+from flight.autopilot import AutopilotError, Setpoint, Telemetry, VehiclePose
+from flight.gimbal import ProcessGimbal, attitude_message
+from flight.telemetry_intake import AUTOPILOT, HANDLERS, TelemetryIntake
+from flight.udp_port import check_address
+
+if TYPE_CHECKING:
+    from mavsdk.asyncio import Mavsdk
+    from mavsdk.plugins.mavlink_direct import MavlinkDirect
+
+logger = logging.getLogger(__name__)
+
+_INTERVALS_S: Mapping[int, float] = {
+    30: 1 / 30,  # ATTITUDE: 100 Hz would be three poses for each position
+    32: 1 / 30,  # LOCAL_POSITION_NED
+    33: 0.5,  # GLOBAL_POSITION_INT: only shown
+    132: 0.1,  # DISTANCE_SENSOR
+    147: 1.0,  # BATTERY_STATUS
+    230: 0.5,  # ESTIMATOR_STATUS
+    231: 0.5,  # WIND_COV: not sent without being asked for
+    436: 0.1,  # CURRENT_MODE: a mode that a pilot takes shall be seen at once, not with the next heartbeat
+}
+_SET_MESSAGE_INTERVAL, _SET_MODE, _TAKE_GIMBAL = 511, 176, 1001
+_CUSTOM_MODE_ENABLED = 1
+_POSITION_AND_YAW = 0b1001_1111_1000  # ignore velocity, acceleration and yaw rate
+_LOCAL_NED = 1
+_STREAM_S = 0.05
+_ANSWER_S = 5.0  # wall seconds; MAVSDK itself gives up on a command after about two
+_MODE_S = 3.0
+_TELEMETRY_S = 10.0
 
 
 class Clock(Protocol):
+    """What the link needs of the executive's clock."""
+
     speed: float
 
     def now(self) -> float: ...
 
-    async def sleep(self, seconds: float) -> None: ...
-
 
 class MavsdkAutopilot:
-    """`MavsdkAutopilot("udpin://0.0.0.0:14540", clock, simulated=False)`; implements flight.autopilot.Autopilot."""
+    """Implements flight.autopilot.Autopilot: `MavsdkAutopilot("udpin://0.0.0.0:14540", clock)`.
 
-    simulated: bool
+    simulated: no real vehicle moves. gimbal: 'mavlink', 'process' (a gimbal that exists only here, for autopilots
+    without one), or 'auto', which decides when the gimbal is taken. ground_station: see `connect`.
+    on_status_text(severity, text) is called on the link's thread."""
 
     def __init__(
         self,
@@ -25,7 +67,327 @@ class MavsdkAutopilot:
         clock: Clock,
         *,
         simulated: bool = False,
+        gimbal: Literal["auto", "mavlink", "process"] = "auto",
+        ground_station: bool = False,
         on_status_text: Callable[[str, str], None] | None = None,
-        gimbal: str = "auto",
     ) -> None:
-        raise NotImplementedError
+        self.simulated = simulated
+        self._address, self._clock, self._gimbal_kind = system_address, clock, gimbal
+        self._ground_station = ground_station
+        self._intake = TelemetryIntake(clock.now, on_status_text)
+        self._mavsdk: Mavsdk | None = None
+        self._direct: MavlinkDirect | None = None
+        self._system: Any = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._watcher: asyncio.Task[None] | None = None
+        self._blocking: set[asyncio.Future[Any]] = set()
+        self._closing = False
+
+    async def connect(self, timeout_s: float) -> None:
+        """Find the vehicle and start telemetry; `timeout_s` is wall time, since an absent vehicle has no other.
+
+        We are a companion computer (1/195), not a ground station: PX4 would count a ground station's heartbeat, which
+        MAVSDK sends from its own thread, as proof that the data link to the operator is alive. The price is that PX4
+        sends no STATUSTEXT; `ground_station` buys it where no other ground station is, as in simulation."""
+        check_address(self._address)
+        from mavsdk import logging as mavsdk_logging
+        from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+        from mavsdk.plugins.mavlink_direct import MavlinkDirect
+
+        mavsdk_logging.log_subscribe(_swallow)
+        self._loop = asyncio.get_running_loop()
+        kind = ComponentType.GROUND_STATION if self._ground_station else ComponentType.COMPANION_COMPUTER
+        self._mavsdk = Mavsdk(Configuration.create_with_component_type(kind))
+        try:
+            try:
+                await self._mavsdk.add_any_connection(self._address)
+            except Exception as error:
+                raise AutopilotError(f"cannot open {self._address}: {error}") from None
+            self._system = await self._mavsdk.first_autopilot(timeout_s)
+            if self._system is None:
+                raise AutopilotError(
+                    f"no autopilot on {self._address} within {timeout_s:g} s: "
+                    "is it powered, and does it send to this port?"
+                )
+            # The asynchronous wrapper would cost a thread switch per setpoint; the call itself takes 0.3 ms.
+            self._direct = MavlinkDirect(self._system._system)
+            for name in HANDLERS:
+                self._direct.subscribe_message(name, self._on_message)
+            await self._request_streams()
+            await self._until(lambda: self._intake.heard, _TELEMETRY_S, "the autopilot sends no position and attitude")
+        except BaseException:
+            await self.close()
+            raise
+        self._watcher = asyncio.create_task(self._watch(), name="link watch")
+
+    async def close(self) -> None:
+        """Stop everything that runs on behalf of the link; idempotent."""
+        self._closing = True
+        if self._watcher is not None:
+            self._watcher.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._watcher
+            self._watcher = None
+        if self._blocking:
+            # Destroying the library under a call that still waits in a thread is not safe; each gives up by itself.
+            await asyncio.wait(self._blocking, timeout=1.5)
+        mavsdk, self._mavsdk = self._mavsdk, None
+        direct, self._direct = self._direct, None
+        if direct is not None:
+            direct.destroy()
+        if mavsdk is not None:
+            mavsdk.destroy()
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """The latest telemetry. `link_age_s` is in wall seconds: a radio does not run faster with a simulation."""
+        return self._intake.telemetry()
+
+    def pose_at(self, stamp_s: float) -> VehiclePose | None:
+        """The pose interpolated at a time on the executive's clock; None outside the last ten seconds."""
+        return self._intake.pose_at(stamp_s)
+
+    async def parameters(self, names: Sequence[str]) -> Mapping[str, float]:
+        """Values of the autopilot's parameters; those that it does not have are left out."""
+        from mavsdk.asyncio.plugins.param import ParamAsync
+        from mavsdk.plugins.param import ParamError, ParamResult
+
+        plugin = ParamAsync(self._require_system())
+        values: dict[str, float] = {}
+        for name in names:
+            for get in (plugin.get_param_int, plugin.get_param_float):
+                try:
+                    values[name] = float(await self._waiting(get(name)))
+                    break
+                except ParamError as error:
+                    if error.result in (ParamResult.NO_SYSTEM, ParamResult.CONNECTION_ERROR):
+                        raise AutopilotError(f"parameter {name}: the link to the autopilot is lost") from None
+                    if error.result is not ParamResult.WRONG_TYPE:
+                        break
+        return values
+
+    async def arm(self) -> None:
+        """Arm. PX4 refuses it in a mode that it was left in by a landing; then it is put on hold first."""
+        telemetry = self.telemetry
+        if telemetry.armed:
+            return
+        if not telemetry.armable:
+            raise AutopilotError(
+                f"the vehicle cannot be armed yet{self._why()}: wait for its checks, or see `mission doctor`"
+            )
+        if telemetry.flight_mode in ("OFFBOARD", "LAND", "RTL"):
+            await self.hold()
+        await self._act("arm", lambda action: action.arm())
+        await self._until(lambda: self._intake.armed, _MODE_S, "the autopilot accepted to arm and did not")
+
+    async def disarm(self) -> None:
+        """Disarm; refused in the air."""
+        await self._act("disarm", lambda action: action.disarm())
+
+    async def take_off(self, height_m: float) -> None:
+        """Start a take-off to a height above the ground; returns when it is accepted."""
+        await self._act("set the take-off height", lambda action: action.set_takeoff_altitude(float(height_m)))
+        await self._act("take off", lambda action: action.takeoff())
+
+    async def land(self) -> None:
+        """Start landing where it is; returns when accepted."""
+        await self._act("land", lambda action: action.land())
+
+    async def hold(self) -> None:
+        """Switch to the autopilot's own position hold."""
+        await self._set_mode("HOLD")
+
+    async def start_offboard(self, first: Setpoint) -> None:
+        """Stream `first` until the autopilot has taken OFFBOARD; PX4 refuses it without a stream."""
+        mode: asyncio.Task[None] | None = None
+        try:
+            for sent in range(round(2 * _MODE_S / _STREAM_S)):
+                self.send(first)
+                if sent == 5:
+                    mode = asyncio.create_task(self._set_mode("OFFBOARD"), name="offboard")
+                if mode is not None and mode.done():
+                    mode.result()
+                    return
+                await asyncio.sleep(_STREAM_S)
+        finally:
+            if mode is not None and not mode.done():
+                mode.cancel()
+        raise AutopilotError(f"OFFBOARD was not taken{self._why()}")
+
+    def send(self, setpoint: Setpoint) -> None:
+        """Send one setpoint once, now. Nothing re-sends it: when the caller stops, the stream stops (dead-man rule)."""
+        north, east, down = (float(value) for value in setpoint.position)
+        self._send(
+            "SET_POSITION_TARGET_LOCAL_NED",
+            {
+                "time_boot_ms": self._intake.boot_ms(self._clock.now()),
+                "target_system": 1,
+                "target_component": AUTOPILOT,
+                "coordinate_frame": _LOCAL_NED,
+                "type_mask": _POSITION_AND_YAW,
+                **{"x": north, "y": east, "z": down, "vx": 0.0, "vy": 0.0, "vz": 0.0},
+                **{"afx": 0.0, "afy": 0.0, "afz": 0.0, "yaw": float(setpoint.yaw), "yaw_rate": 0.0},
+            },
+        )
+
+    async def take_gimbal(self) -> None:
+        """Take control of the gimbal, or set up the one in process."""
+        if self._gimbal_kind == "process" or self._intake.process_gimbal is not None:
+            self._use_process_gimbal()
+            return
+        try:
+            result = await self._command(_TAKE_GIMBAL, "take the gimbal", -2, -2, -1, -1)
+        except AutopilotError:
+            result = -1
+        if result == 0:
+            heard = contextlib.suppress(AutopilotError) if self._gimbal_kind == "auto" else contextlib.nullcontext()
+            with heard:
+                await self._until(lambda: self._intake.gimbal_heard, _MODE_S, "the gimbal reports no angles")
+                return
+        elif self._gimbal_kind == "mavlink":
+            answer = px4_modes.RESULTS.get(result, "no answer")
+            raise AutopilotError(f"no control of the gimbal ({answer}): is MNT_MODE_IN 4, and is the gimbal on?")
+        self._use_process_gimbal()
+
+    def point_gimbal(self, yaw: float, pitch: float) -> None:
+        """Send gimbal angles once, radians: yaw from north, pitch up from the horizon."""
+        if self._intake.process_gimbal is not None:
+            self._intake.process_gimbal.point(self._clock.now(), yaw, pitch)
+        else:
+            self._send("GIMBAL_MANAGER_SET_ATTITUDE", attitude_message(yaw, pitch))
+
+    def _use_process_gimbal(self) -> None:
+        if self._intake.process_gimbal is None:
+            gimbal = ProcessGimbal()
+            gimbal.point(self._clock.now(), float(self.telemetry.pose.attitude[2]), 0.0)
+            self._intake.process_gimbal = gimbal
+
+    def _on_message(self, message: Any, _: Any) -> None:
+        """On the library's thread."""
+        if not self._closing and message.system_id == 1:
+            try:
+                self._intake.receive(message.message_name, message.component_id, json.loads(message.fields_json))
+            except (KeyError, TypeError, ValueError) as error:
+                logger.warning("unreadable %s: %s", message.message_name, error)
+
+    def _send(self, name: str, fields: Mapping[str, Any]) -> None:
+        from mavsdk.plugins.mavlink_direct import MavlinkDirectError, MavlinkMessage
+
+        if self._direct is None:
+            raise AutopilotError("the link to the vehicle is closed")
+        try:
+            self._direct.send_message(MavlinkMessage(name, 0, 0, 1, AUTOPILOT, json.dumps(fields)))
+        except MavlinkDirectError as error:
+            raise AutopilotError(f"{name} could not be sent: {error.result.name.lower().replace('_', ' ')}") from None
+
+    async def _command(self, command: int, what: str, *parameters: float) -> int:
+        """MAV_RESULT of a command. Answers come as a callback, so that no thread waits for them."""
+        from mavsdk.plugins.mavlink_direct import MavlinkDirectResult, MavlinkMessage
+
+        loop, direct = asyncio.get_running_loop(), self._direct
+        if direct is None:
+            raise AutopilotError("the link to the vehicle is closed")
+        answer: asyncio.Future[int | None] = loop.create_future()
+
+        def resolve(result: int | None) -> None:
+            if not answer.done():
+                answer.set_result(result)
+
+        def on_answer(outcome: Any, ack: Any, _: Any) -> None:
+            found = json.loads(ack.fields_json).get("result") if outcome is MavlinkDirectResult.SUCCESS else None
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(resolve, found)
+
+        fields: dict[str, Any] = {
+            "target_system": 1,
+            "target_component": AUTOPILOT,
+            "command": command,
+            "confirmation": 0,
+        }
+        fields |= {f"param{i + 1}": float(parameters[i]) if i < len(parameters) else 0.0 for i in range(7)}
+        direct.send_command_async(MavlinkMessage("COMMAND_LONG", 0, 0, 1, AUTOPILOT, json.dumps(fields)), on_answer)
+        try:
+            result = await asyncio.wait_for(answer, _ANSWER_S)
+        except TimeoutError:
+            result = None
+        if result is None:
+            raise AutopilotError(f"{what}: the autopilot does not answer")
+        return result
+
+    async def _set_mode(self, mode: str) -> None:
+        """PX4 acknowledges a mode twice, first always 'accepted' and then the truth: so the mode itself is waited
+        for."""
+        if self._intake.mode == mode:
+            return
+        main, sub = px4_modes.numbers_of(mode)
+        self._intake.mode_answers.clear()
+        result = await self._command(_SET_MODE, f"change to {mode}", _CUSTOM_MODE_ENABLED, main, sub)
+
+        def settled() -> bool:
+            refused = [answer for answer in self._intake.mode_answers if answer != 0]
+            if refused or result != 0:
+                answer = px4_modes.RESULTS.get(refused[-1] if refused else result, "refused")
+                raise AutopilotError(f"change to {mode}: {answer}{self._why()}")
+            return self._intake.mode == mode
+
+        await self._until(settled, _MODE_S, f"change to {mode}: accepted, but the mode stayed {self._intake.mode}")
+
+    async def _act(self, what: str, call: Callable[[Any], Awaitable[None]]) -> None:
+        """One call of MAVSDK's action plugin, its refusals in one line."""
+        from mavsdk.asyncio.plugins.action import ActionAsync
+        from mavsdk.plugins.action import ActionError
+
+        try:
+            await self._waiting(call(ActionAsync(self._require_system())))
+        except ActionError as error:
+            answer = error.result.name.lower().replace("_", " ")
+            raise AutopilotError(f"{what}: {answer}{self._why()}") from None
+
+    async def _waiting(self, call: Awaitable[Any]) -> Any:
+        """Await a call that blocks a thread, and remember it for `close` even when the caller is cancelled."""
+        future = asyncio.ensure_future(call)
+        self._blocking.add(future)
+        future.add_done_callback(self._blocking.discard)
+        future.add_done_callback(lambda done: None if done.cancelled() else done.exception())
+        return await asyncio.shield(future)
+
+    def _require_system(self) -> Any:
+        if self._system is None or self._mavsdk is None:
+            raise AutopilotError("the link to the vehicle is not open")
+        return self._system
+
+    def _why(self) -> str:
+        """The vehicle's own last words, where it has any."""
+        return f" ({self._intake.last_text})" if self._intake.last_text else ""
+
+    async def _request_streams(self) -> None:
+        """Ask for the streams at our rates; one that the autopilot does not have is only missed."""
+        for message, interval in _INTERVALS_S.items():
+            result = await self._command(_SET_MESSAGE_INTERVAL, "set a message interval", message, interval * 1e6)
+            if result != 0:
+                logger.info("message %d at %.3g s: %s", message, interval, px4_modes.RESULTS.get(result, result))
+
+    async def _watch(self) -> None:
+        """Ask for the streams again when the vehicle was away: it may have started anew."""
+        connected = True
+        while True:
+            await asyncio.sleep(0.25)
+            was, connected = connected, self.telemetry.connected
+            if connected and not was:
+                try:
+                    await self._request_streams()
+                except AutopilotError:
+                    connected = False
+
+    async def _until(self, condition: Callable[[], bool], wall_s: float, complaint: str) -> None:
+        for _ in range(round(wall_s / 0.02)):
+            if condition():
+                return
+            await asyncio.sleep(0.02)
+        raise AutopilotError(complaint)
+
+
+def _swallow(level: Any, message: str, file: str | None, line: int) -> bool:
+    """MAVSDK's own messages go to the run's log, not to the operator's terminal."""
+    logger.debug("mavsdk: %s", message)
+    return True
