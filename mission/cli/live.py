@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import select
+import signal
 import sys
 import threading
 import time
@@ -85,9 +86,7 @@ class PlainView(_Watcher):
         super().start(executive)
 
     def ask(self, question: str) -> bool:
-        if not (sys.stdin.isatty() and sys.stdout.isatty()):
-            return False
-        return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+        return _prompt(question) if sys.stdin.isatty() and sys.stdout.isatty() else False
 
     def close(self) -> None:
         super().close()
@@ -139,7 +138,7 @@ class LiveView(_Watcher):
 
     def ask(self, question: str) -> bool:
         if self._thread is None:
-            return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+            return _prompt(question)
         with self._asking:
             answered = threading.Event()
             answers: list[bool] = []
@@ -180,6 +179,19 @@ class LiveView(_Watcher):
         name = KEYS.get(key.lower())
         if name is not None:
             act(executive, name)
+
+
+def _prompt(question: str) -> bool:
+    """Ask on a line of its own. Ctrl-C ends the program, whoever handles it otherwise: nothing has taken off yet."""
+    ours = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler) if ours else None
+    try:
+        return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+    except EOFError:
+        return False
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
 
 
 def act(executive: Executive, name: str) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.cli.errors import ABORTED, INTERRUPTED, OUTCOME_CODES, USAGE, CommandError
+from mission.cli.errors import ABORTED, INTERRUPTED, OUTCOME_CODES, REFUSED, CommandError
 
 if TYPE_CHECKING:
     from mission.cli.live import View
@@ -159,15 +159,15 @@ def _fly(
                 **options,
             )
         )
-    except FlightError:
-        view.close()
-        _discard_if_empty(folder)
-        raise
     except Exception as error:
         view.close()
+        if isinstance(error, FlightError):
+            _discard_if_empty(folder)
+            raise
         raise CommandError(_crashed(folder, error), ABORTED) from error
     except BaseException:
         view.close()
+        _discard_if_empty(folder)
         raise
     return result, view
 
@@ -197,8 +197,9 @@ def _close(folder: RunFolder, result: FlightResult, wall_s: float) -> None:
     """Compute and print what the run came to."""
     from mission.cli.report import rebuild, told
 
-    if result.outcome == "refused" and not folder.journal.exists():
-        raise CommandError("refused before take-off", USAGE)
+    if not folder.journal.exists():
+        _discard_if_empty(folder)
+        raise CommandError("nothing was flown: the vehicle is not armed without a yes", REFUSED)
     summary = rebuild(folder, wall_s=wall_s)
     for line in told(folder, summary):
         print(line)

@@ -107,6 +107,25 @@ def test_a_flight_that_cannot_begin_is_one_line_and_leaves_no_folder(call: Call,
     assert list((tmp_path / "logs").iterdir()) == []
 
 
+def test_a_no_to_arming_is_exit_code_3_and_leaves_no_folder(call: Call, flights: Any, tmp_path: Path) -> None:
+    flights(lambda options: FlightResult("refused", "preflight", False))
+    said = call("run", BLADE, "--record", tmp_path / "logs")
+    said.assert_one_line(3)
+    assert list((tmp_path / "logs").iterdir()) == []
+
+
+def test_ctrl_c_before_anything_flew_is_exit_code_130_and_leaves_no_folder(
+    call: Call, flights: Any, tmp_path: Path
+) -> None:
+    def fly(options: FlightOptions) -> FlightResult:
+        raise KeyboardInterrupt
+
+    flights(fly)
+    said = call("run", BLADE, "--record", tmp_path / "logs")
+    assert (said.code, said.err) == (130, "")
+    assert list((tmp_path / "logs").iterdir()) == []
+
+
 def test_a_crash_is_one_line_with_its_traceback_in_the_run_s_folder(call: Call, flights: Any, tmp_path: Path) -> None:
     def fly(options: FlightOptions) -> FlightResult:
         write_journal(options.folder, until_s=60.0)
