@@ -85,7 +85,10 @@ class State:
 
 @dataclass(frozen=True)
 class Mission:
-    """A whole mission, resolved: includes, references and overrides are done, every name means something."""
+    """A whole mission, resolved: includes, references and overrides are done, every name means something.
+
+    location: of the mission's own `on`, or of `states` without it: what holds for all states is said there.
+    """
 
     name: str
     version: int
@@ -102,6 +105,7 @@ class Mission:
     on: tuple[Transition, ...] = ()
     invariants: tuple[Invariant, ...] = ()
     text: str = ""
+    location: Location = NOWHERE
 
     def ancestors(self, path: str) -> tuple[str, ...]:
         """The state and all around it, innermost first."""

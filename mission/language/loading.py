@@ -170,6 +170,8 @@ def _mission(root: Table, path: Path, problems: list[Diagnostic]) -> Mission | N
     on_node = root.get("on")
     on = TransitionReader(reader.found, [p for p in states if states[p].children], events, problems)
     transitions = on.read(on_node, "") if on_node is not None else ()
+    first = [initial] if initial is not None and "" not in reader.guessed else []
+    reader.unnamed(states, first + [transition.target for transition in transitions])
     stated = invariants.read(root, states, problems)
     name = _name(root, problems)
     if turbine is None or rig is None or site is None or limits is None or initial is None or _errors(problems):
@@ -190,6 +192,7 @@ def _mission(root: Table, path: Path, problems: list[Diagnostic]) -> Mission | N
         on=transitions,
         invariants=stated,
         text=root.text("text") or "",
+        location=root.key_location("on" if on_node is not None else "states"),
     )
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mission.behaviours.behaviour import Behaviour, NoParameters, Parameters
 from mission.language.diagnostics import Diagnostic, near_or_choices
-from mission.language.document import OUTCOMES, State
+from mission.language.document import OUTCOMES, State, enclosing
 from mission.language.limits import Limits
 from mission.language.location import Location
 from mission.language.transitions_in import TransitionReader, read_flag, read_number
@@ -56,12 +56,30 @@ class StatesReader:
         self.limits = limits
         self.problems = problems
         self.found: dict[str, _Found] = {}
+        self.guessed: set[str] = set()
 
     def read(self, states: Node) -> dict[str, State]:
         """Path → state, in file order, outer states before those inside."""
         self.collect(states, None)
         reader = self.transition_reader()
         return {path: self.state(found, reader) for path, found in self.found.items()}
+
+    def unnamed(self, states: Mapping[str, State], named: Iterable[str]) -> None:
+        """Report states that nothing names, where something names a state that does not exist: the typo may be either.
+
+        named: paths that the mission's own `initial` and `on` lead to.
+        """
+        if not any(finding.code == "M212" for finding in self.problems):
+            return
+        ways = [("", target) for target in named]
+        ways += [(path, transition.target) for path, state in states.items() for transition in state.on]
+        ways += [(path, state.initial) for path, state in states.items() if state.initial and path not in self.guessed]
+        # What leads into a state from within does not count for the state itself.
+        reached = {path for source, target in ways for path in enclosing(target) if path not in enclosing(source)}
+        reached |= {target for _, target in ways}
+        for path, state in states.items():
+            if path not in reached and not state.entry:
+                self.report(state.location, "M301", f"nothing names the state {path!r}")
 
     def transition_reader(self) -> TransitionReader:
         """Reads transitions among the states that were found."""
@@ -74,6 +92,7 @@ class StatesReader:
         children = [path for path, found in self.found.items() if (found.parent or "") == scope]
         names = [path.rpartition(".")[2] for path in children]
         node = table.get("initial")
+        self.guessed.add(scope)
         if node is None:
             self.report(place, "M201", f"{what} needs `initial`: the state inside that is entered first")
             return children[0] if children else None
@@ -85,6 +104,7 @@ class StatesReader:
             hint = near_or_choices(node.value, names)
             self.report(node.location, "M212", f"initial: there is no state {node.value!r} in {what}", hint)
             return children[0] if children else None
+        self.guessed.discard(scope)
         return path
 
     def collect(self, node: Node, parent: str | None) -> tuple[str, ...]:

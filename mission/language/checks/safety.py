@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from mission.executive.events import Event
+from mission.executive.events import Event, fallbacks
 from mission.language.diagnostics import Diagnostic
 from mission.language.document import Mission, enclosing
 from mission.language.exploration import Exploration, Situation, behaviour_of, happening, safety_events
@@ -30,15 +30,24 @@ def unanswered_events(exploration: Exploration) -> Iterator[Diagnostic]:
     told: set[tuple[str, str]] = set()
     for leaf in airborne:
         by_place: dict[str, list[str]] = {}
-        for name, weakness in missing[leaf].items():
+        for name in _roots(missing[leaf]):
             place = _outermost(leaf, name, missing, airborne)
             if (place, name) not in told:
                 told.add((place, name))
-                by_place.setdefault(place, []).append(name + weakness)
+                by_place.setdefault(place, []).append(name + missing[leaf][name])
         for place, names in by_place.items():
             what = "airborne state" if place == leaf else "state with airborne states inside"
             message = f"the {what} {place!r} does not answer {', '.join(names)}"
-            yield Diagnostic(mission.states[place].location, "M307", message, "add it to `on`, here or further out")
+            hint = "add it to `on`, here or further out"
+            if not place:
+                message, hint = f"no airborne state answers {', '.join(names)}", "add it to the mission's own `on`"
+            location = mission.states[place].location if place else mission.location
+            yield Diagnostic(location, "M307", message, hint)
+
+
+def _roots(missing: Mapping[str, str]) -> list[str]:
+    """Those of the unanswered events that do not fall back to another of them: answering these answers all."""
+    return [name for name in missing if not any(other in missing for other in fallbacks(name)[1:])]
 
 
 def unanswered(mission: Mission, leaf: str, event: Event) -> str | None:
@@ -118,10 +127,12 @@ def wrong_side_of_take_off(exploration: Exploration) -> Iterator[Diagnostic]:
 
 
 def _outermost(leaf: str, event: str, missing: dict[str, dict[str, str]], airborne: list[str]) -> str:
-    """The outermost state around a leaf all of whose airborne leaves lack the event."""
+    """The outermost state around a leaf all of whose airborne leaves lack the event; "" where all leaves do."""
+    if len(airborne) > 1 and all(event in missing[other] for other in airborne):
+        return ""
     best = leaf
     for path in enclosing(leaf):
-        if all(event in missing.get(other, ()) for other in airborne if path in enclosing(other)):
+        if all(event in missing[other] for other in airborne if path in enclosing(other)):
             best = path
     return best
 
