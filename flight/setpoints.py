@@ -28,13 +28,14 @@ class Clock(Protocol):
 
 @dataclass(frozen=True)
 class Sent:
-    """One setpoint as it left: wall_s (since the stream's first start), t on the executive's clock, what was sent, and
-    whether the keep-out volume had moved it."""
+    """One setpoint as it left: wall_s (since the stream was made), t on the executive's clock, what was sent, whether
+    the keep-out volume had moved it, and whether it is the first of a stream: the time before it is no gap."""
 
     wall_s: float
     t: float
     setpoint: Setpoint
     bounded: bool
+    first: bool = False
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class SetpointStream:
         await self._autopilot.start_offboard(bounded)
         self._last = None
         self._stalled = False
-        self._send()
+        self._send(first=True)
         self._task = asyncio.create_task(self._stream(), name="setpoints")
 
     def stop(self) -> None:
@@ -124,7 +125,7 @@ class SetpointStream:
                 self._stalled, self._last = True, None
                 self._report("setpoints_stalled")
 
-    def _send(self) -> None:
+    def _send(self, first: bool = False) -> None:
         if self.target is None:
             return
         setpoint, bounded = self._bounded(self.target)
@@ -135,7 +136,7 @@ class SetpointStream:
         s = self.statistics
         self.statistics = StreamStatistics(s.sent + 1, max(s.longest_gap_s, gap), s.gaps + (gap > GAP_S))
         if self._on_sent is not None:
-            self._on_sent(Sent(now - self._origin, self._clock.now(), setpoint, bounded))
+            self._on_sent(Sent(now - self._origin, self._clock.now(), setpoint, bounded, first))
         if bounded and not self._was_bounded:
             self._report("keep_out_bounded")
         self._was_bounded = bounded
