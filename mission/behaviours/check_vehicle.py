@@ -9,6 +9,8 @@ from mission.behaviours.behaviour import NoParameters, behaviour
 if TYPE_CHECKING:
     from mission.executive.services import Services
 
+MARGIN_PERCENT = 10.0  # a flight that begins at its limit would end at once
+
 
 @behaviour(
     outcomes={"passed": "nothing speaks against flying", "failed": "a finding forbids it; the journal says which"},
@@ -21,7 +23,11 @@ async def check_vehicle(services: Services, parameters: NoParameters) -> str:
     while not services.autopilot.telemetry.armable:
         services.progress.text = "waiting until the vehicle can be armed"
         await services.clock.sleep(0.5)
-    findings = await check(services.autopilot, services.mission.limits, services.clock.speed)
+    findings = await check(
+        services.autopilot,
+        battery_percent=services.mission.limits.battery_percent + MARGIN_PERCENT,
+        speed=services.clock.speed,
+    )
     for finding in findings:
         services.log.info("preflight", code=finding.code, level=finding.level, text=finding.text, remedy=finding.remedy)
     refusals = [finding for finding in findings if finding.level == "refuse"]

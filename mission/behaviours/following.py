@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mission.executive.services import Services
     from vision.estimate import BladeEstimate, SideEstimate
 
+ROOM = 0.4  # share of the half image kept free beyond the edge (5.16): enough background to find it by
 FULL_SPEED_AGE_S = 0.8  # vision younger than this: full speed
 STOP_AGE_S = 2.0  # older: creep no further on prediction alone
 
@@ -42,6 +43,7 @@ class Following:
             toward=toward,
             standoff_m=standoff_m,
             speed_m_s=speed_m_s,
+            k=ROOM,
         )
         services.perception.watch_blade(True)
 

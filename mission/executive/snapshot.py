@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from vision.observation import BladeObservation
 
 T = TypeVar("T")
+GROUND_M = 3.0  # lower than this over home, a range finder that looks ahead may meet the ground
 FRESH_S = 0.6  # older measurements say nothing of what is near now
 
 
@@ -57,10 +58,18 @@ class Snapshot:
             found.append(seen.nearest_m)
         if self.estimate is not None and self.estimate.age_s <= self.limits.vision_bridge_s:
             found.append(self.estimate.nearest_m)
-        if self.telemetry.range_m is not None and self.telemetry.range_age_s <= FRESH_S:
+        over_ground = self.height_m is None or self.height_m >= GROUND_M
+        if over_ground and self.telemetry.range_m is not None and self.telemetry.range_age_s <= FRESH_S:
             found.append(self.telemetry.range_m)
         measured = [distance for distance in found if np.isfinite(distance)]
         return min(measured) if measured else None
+
+    @property
+    def height_m(self) -> float | None:
+        """Above home."""
+        if self.home is None:
+            return None
+        return _known(self.home[2] - float(self.telemetry.pose.position[2]))
 
     @property
     def home_m(self) -> float | None:
