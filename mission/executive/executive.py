@@ -141,8 +141,11 @@ class Executive:
         Raises:
             EventError: nobody declared it.
         """
-        if event(name).lets_go:
+        entry = event(name)
+        if entry.lets_go:
             self._let_go()
+        if entry.raised_by == "operator" and "by" in data:
+            self.note(name, str(data["by"]), **{key: value for key, value in data.items() if key != "by"})
         self._queue.put(name, data)
 
     def raise_event_threadsafe(self, name: str, **data: Any) -> None:
@@ -261,6 +264,10 @@ class Executive:
     async def _handle(self, queued: Queued) -> None:
         if queued.activation is not None and queued.activation != self._work.activation:
             self._journal_event(queued, "stale", {})
+            return
+        if queued.name == "step" and self._pending is not None:
+            self._journal_event(queued, "confirmation", {})
+            self.confirm(True)
             return
         quantities = self._quantities()
         transition = self._transition(queued, quantities)

@@ -15,7 +15,7 @@ from flight.autopilot import Setpoint, Telemetry, VehiclePose
 from mission.behaviours import behaviour as registry
 from mission.behaviours.behaviour import Behaviour, NoParameters
 from mission.executive import executive as module
-from mission.executive.clock import LockstepClock, LockstepLoop
+from mission.executive.clock import Clock, LockstepClock, LockstepLoop, WallClock
 from mission.executive.executive import Executive, Outcome
 from mission.executive.journal import Journal, read_journal
 from mission.executive.services import Services
@@ -132,22 +132,11 @@ class Flight:
         return found
 
     def run(self) -> Outcome:
-        """Fly; at the given times the given things happen."""
+        """Fly in lockstep time; at the given times the given things happen."""
         raw = self.services.autopilot, self.services.setpoints
 
         async def flown() -> Outcome:
-            clock = LockstepClock()
-            self.services.clock = clock
-            self.executive = Executive(
-                self.mission,
-                self.services,
-                clock,
-                Journal(self.path, sync=False),
-                ask=self.ask,
-                autonomy=self.autonomy,  # type: ignore[arg-type]
-                resume=self.resume,
-            )
-            self.services.raise_event = self.executive.raise_event
+            self.prepare(LockstepClock())
             for due, action in self.at:
                 asyncio.get_running_loop().call_at(due, action, self.executive)
             return await asyncio.wait_for(self.executive.run(), self.patience_s)
@@ -157,6 +146,34 @@ class Flight:
                 return runner.run(flown())
         finally:
             self.services.autopilot, self.services.setpoints = raw
+
+    def run_on_the_wall(self, beside: Callable[[Executive], Awaitable[None]], speed: float = 20.0) -> Outcome:
+        """Fly in wall time, something else going on beside it."""
+
+        async def flown() -> Outcome:
+            clock = WallClock(speed)
+            self.prepare(clock)
+            run = asyncio.ensure_future(self.executive.run())
+            await beside(self.executive)
+            outcome = await asyncio.wait_for(run, 30.0)
+            clock.close()
+            return outcome
+
+        return asyncio.run(flown())
+
+    def prepare(self, clock: Clock) -> None:
+        """The executive, ready to run."""
+        self.services.clock = clock
+        self.executive = Executive(
+            self.mission,
+            self.services,
+            clock,
+            Journal(self.path, sync=False),
+            ask=self.ask,
+            autonomy=self.autonomy,  # type: ignore[arg-type]
+            resume=self.resume,
+        )
+        self.services.raise_event = self.executive.raise_event
 
     @property
     def journal(self) -> list[tuple[str, Mapping[str, Any]]]:

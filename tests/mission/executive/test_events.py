@@ -1,4 +1,4 @@
-"""The event table: complete, ordered by severity, and every safety event ends in an abort unless a mission knows better."""
+"""The event table: complete, every safety event ends in an abort unless somebody knows better."""
 
 from __future__ import annotations
 
