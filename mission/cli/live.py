@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from mission.cli.scene import Scene, VisionRate, take_scene
@@ -163,9 +164,11 @@ class LiveView(_Watcher):
         with _keys() as pressed, Live(console=console, auto_refresh=False, transient=True) as live:
             while not self._stop.is_set():
                 self._events = [*self._events, *self._journal.news()][-8:]
-                scene = self._scene(executive)
+                question, scene = self._question, self._scene(executive)
                 if scene is not None:
-                    scene = _with_events(scene, self._events)
+                    if question is not None and scene.question is None:
+                        self._settle(False)  # something else happened: nobody waits for this answer any more
+                    scene = replace(scene, events=tuple(self._events))
                     live.update(draw(scene, self._question, str(self._folder.path)), refresh=True)
                 for key in pressed(REFRESH_S):
                     self._press(executive, key)
@@ -173,12 +176,15 @@ class LiveView(_Watcher):
     def _press(self, executive: Executive, key: str) -> None:
         if self._question is not None:
             if key in "yYnN":
-                self._question = None
-                self._answer(key in "yY")
+                self._settle(key in "yY")
             return
         name = KEYS.get(key.lower())
         if name is not None:
             act(executive, name)
+
+    def _settle(self, yes: bool) -> None:
+        self._question = None
+        self._answer(yes)
 
 
 def _prompt(question: str) -> bool:
@@ -197,12 +203,6 @@ def _prompt(question: str) -> bool:
 def act(executive: Executive, name: str) -> None:
     """Raise an operator's event from the view's thread."""
     executive.raise_event_threadsafe(name, by="keyboard")
-
-
-def _with_events(scene: Scene, events: list[tuple[float, str]]) -> Scene:
-    from dataclasses import replace
-
-    return replace(scene, events=tuple(events))
 
 
 @contextlib.contextmanager

@@ -30,7 +30,7 @@ def draw(scene: Scene, question: str | None = None, footer: str = "") -> Rendera
     rows.add_row("next", _next(scene.following))
     rows.add_row("", "")
     rows.add_row("events", _events(scene.events))
-    parts: list[RenderableType] = [rows]
+    parts: list[RenderableType] = [rows, *(Text(f"  {alarm}", "bold white on red") for alarm in scene.alarms)]
     if question is not None:
         parts.append(Panel(Text.assemble((question, "bold"), "  y / n"), border_style="yellow"))
     how = f"simulated × {scene.speed:g}" if scene.simulated else "[bold red]real vehicle[/]"

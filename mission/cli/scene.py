@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mission.executive.executive import Executive
+    from mission.executive.status import Status
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class Scene:
     link_age_s: float | None = None
     recording: str = ""
     question: str | None = None
+    alarms: tuple[str, ...] = ()
     following: tuple[Next, ...] = ()
     events: tuple[tuple[float, str], ...] = ()
 
@@ -108,8 +110,19 @@ def take_scene(executive: Executive, rate: VisionRate) -> Scene:
         link_age_s=telemetry.link_age_s,
         recording=getattr(perception, "side", None) or "",
         question=status.waiting,
+        alarms=_alarms(status),
         following=tuple(Next(entry.event, entry.target, entry.blocked or "") for entry in status.next),
     )
+
+
+def _alarms(status: Status) -> tuple[str, ...]:
+    """What an operator must not miss."""
+    told = (
+        (status.let_go, "a pilot flies: this program sends nothing any more"),
+        (status.interrupted, "interrupted: the mission ends as its abort path says"),
+        (status.journal_error is not None, status.journal_error or ""),
+    )
+    return tuple(text for shown, text in told if shown)
 
 
 def _quietly(estimate: Any) -> Any:

@@ -59,7 +59,7 @@ class RunRecorder:
 
     def sent(self, sent: Sent) -> None:
         """A setpoint that left."""
-        self.setpoints.record(sent.wall_s, sent.t, sent.bounded, getattr(sent, "first", False))
+        self.setpoints.record(sent.wall_s, sent.t, sent.bounded, sent.first)
 
     async def follow(
         self, clock: Clock, autopilot: Autopilot, setpoints: SetpointStream | None = None, rate_hz: float = 10.0

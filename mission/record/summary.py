@@ -54,9 +54,8 @@ def summarise(history: RunHistory, wall_s: float | None = None) -> Mapping[str, 
         "frames": len(history.frames),
         "setpoints": _setpoints(history.setpoints),
     }
-    truth = _truth(history)
-    if truth is not None:
-        summary["truth"] = truth
+    if history.folder.truth.is_file():
+        summary["truth"] = _truth(history)
     result: Mapping[str, Any] = plain(summary)
     return result
 
@@ -165,11 +164,10 @@ def _setpoints(rows: Sequence[Mapping[str, str]]) -> Mapping[str, float | None]:
 
 
 def _truth(history: RunHistory) -> Mapping[str, Any] | None:
-    """What the simulated world knows of the run; None outside simulation."""
-    if not history.folder.truth.is_file():
-        return None
+    """What the simulated world knows of the run; None where too little of it was recorded."""
+    from devices.world.truth import truth_of_run
+
     try:
-        from devices.world.truth import truth_of_run
-    except ImportError:
-        return None
-    return truth_of_run(history.folder.path)
+        return truth_of_run(history.folder.path)
+    except (ValueError, KeyError, TypeError, IndexError):
+        return None  # torn files of a killed run

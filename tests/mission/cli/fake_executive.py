@@ -27,6 +27,7 @@ class FakeExecutive:
 
     def __init__(self, folder: RunFolder, now_s: float = 72.0) -> None:
         self.raised: list[str] = []
+        self.waiting: str | None = None
         self.now_s = now_s
         self._journal = folder.journal
         self._started = time.monotonic()
@@ -49,7 +50,7 @@ class FakeExecutive:
         return Status(
             mission="v80_blade", path="inspect.leading", now_s=self.services.clock.now(), entered_s=60.0,
             deadline_s=300.0, behaviour="follow_edge", next=following, recent=(), autonomy="full",
-            paused="paused" in self.raised, waiting=None, let_go=False, interrupted=False, journal_error=None,
+            paused="paused" in self.raised, waiting=self.waiting, let_go=False, interrupted=False, journal_error=None,
             ended=None,
         )  # fmt: skip
 
@@ -66,6 +67,7 @@ def show(path: Path) -> None:
     write_journal(folder, until_s=90.0)
     view = open_view(MISSION, folder, headless=False)
     executive: Any = FakeExecutive(folder)
+    executive.waiting = "Arm the vehicle?" if "--ask" in sys.argv else None
     view.start(executive)
     answer = view.ask("Arm the vehicle?") if "--ask" in sys.argv else None
     while "abort" not in executive.raised:

@@ -53,6 +53,13 @@ def test_the_visible_stretch_is_what_the_camera_sees_of_a_line_in_space(
     assert abs(seen[1] - stations[inside].max()) < 0.01
 
 
+def test_truth_and_belief_call_the_same_frames_sharp() -> None:
+    from devices.world import truth
+    from mission.record import coverage
+
+    assert truth.SHARP == coverage.SHARP
+
+
 def test_an_edge_outside_the_image_covers_nothing() -> None:
     base = estimate(0.0, 20.0, 3.0)
     assert base.leading is not None
