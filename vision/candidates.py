@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import StereoPair
 from vision.capture import Image
-from vision.lines import Profiles, refine_lines
+from vision.lines import Profiles, refine_lines, sampled, steps
 from vision.surface import Surface
 
 Array = NDArray[np.float64]
@@ -18,6 +17,7 @@ Array = NDArray[np.float64]
 CANDIDATES = 28
 LEAST_SUPPORT = 0.5
 INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
+LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
 PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
 
 
@@ -75,9 +75,9 @@ def texture_between(smooth: Image, dots: Array) -> float:
     if len(first) == 0:
         return 0.0
     share = np.linspace(0.0, 1.0, 12)[:, None, None]
-    points = (dots[first] * (1 - share) + dots[second] * share).astype(np.float32)
-    values = cv2.remap(smooth, points[..., 0], points[..., 1], cv2.INTER_LINEAR).astype(np.float32)
-    return float(np.quantile(np.abs(values[2:] - values[:-2]).max(axis=0), 0.8))
+    points = dots[first] * (1 - share) + dots[second] * share
+    change = np.abs(steps(sampled(smooth, points[..., 0].T, points[..., 1].T)))
+    return float(np.quantile(change.max(axis=1), 0.8))
 
 
 def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherEye | None) -> list[Candidate]:
@@ -110,20 +110,24 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     profile = profile.take(good)
     beside, support, low, high = beside[good], support[good], low[good], high[good]
     step = _typical_step(profile, beside)
-    parallax = _parallax(profile, other, beside, noise) if other is not None else np.full(len(good), 0.8)
+    parallax = _parallax(profile, other, beside, noise) if other is not None else np.full(len(good), np.nan)
     blocked = _blocked(profile, blade, smooth, step, low, high, noise)
-    strongest = max(float(np.max(np.where(blocked < 0.5, step, 0))), 1.0)
+    gaps = [_missing(blade, profile.normal[k], float(profile.rho[k]), low[k], high[k]) for k in range(len(good))]
+    empties = np.array([gap[0] for gap in gaps])
+    likely = (blocked < 0.5) & ~(parallax < 0.4) & (empties < 0.3)
+    strongest = max(float(np.max(np.where(likely, step, 0))), 1.0)
     found = []
     for k in range(len(good)):
-        empty, beyond = _missing(blade, profile.normal[k], float(profile.rho[k]), low[k], high[k])
+        empty, beyond = gaps[k]
+        told = parallax[k]
         value = (
             2.0 * support[k]
-            + 0.55 * float(np.clip(np.log2(step[k] / strongest), -3.0, 0.5))
-            + 1.2 * (parallax[k] - 0.8)
+            + 0.35 * float(np.clip(np.log2(step[k] / strongest), -3.0, 0.5))
+            + 0.35 * float(np.clip(np.log2(step[k] / max(blade.texture, 1.0)), -2.0, 1.0))
+            + (0.2 if np.isnan(told) else 0.6 * told if told > 0.5 else -5.0 * (0.5 - told))
             - 2.0 * blocked[k]
             - 2.5 * empty
-            + 0.12 * min(beyond, 5)
-            + 0.5 * float(np.clip(np.log2(step[k] / max(blade.texture, 1.0)), -2.0, 1.0))
+            + 0.15 * min(beyond, 6)
         )
         found.append(
             Candidate(
@@ -166,10 +170,16 @@ def _run(t: Array, agrees: NDArray[np.bool_], focus: float) -> tuple[float, floa
         if len(near) == 0:
             return float(t[0]), float(t[-1])
         at = int(near[np.argmin(np.abs(near - at))])
-    gaps = np.flatnonzero(~share)
-    before, after = gaps[gaps < at], gaps[gaps > at]
-    first = int(before[-1]) + 1 if len(before) else 0
-    last = int(after[0]) - 1 if len(after) else len(t) - 1
+    length = t[1] - t[0]
+    first, last = at, at
+    for k in np.flatnonzero(share[at:]) + at:
+        if (k - last) * length > LONGEST_GAP:
+            break
+        last = int(k)
+    for k in np.flatnonzero(share[: at + 1])[::-1]:
+        if (first - k) * length > LONGEST_GAP:
+            break
+        first = int(k)
     return float(t[first]), float(t[last])
 
 
@@ -191,37 +201,29 @@ def _blocked(
 ) -> Array:
     """Share (k,) of the stretch beside the dots on which a step as strong as the line's own, and stronger than the blade's
     texture, lies between the outermost dots and the line."""
-    height, width = smooth.shape
+    height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     share = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES
     places = low[:, None] + (high - low)[:, None] * share
-    inward = 4.0 + INWARD_STEP * np.arange(INWARD_SAMPLES)
+    inward = 5.0 + INWARD_STEP * np.arange(INWARD_SAMPLES)
     points = profile.normal[:, None] * profile.rho[:, None, None] + places[..., None] * profile.direction[:, None]
-    u = (points[..., 0, None] - inward * profile.normal[:, 0, None, None] + centre[0]).astype(np.float32)
-    v = (points[..., 1, None] - inward * profile.normal[:, 1, None, None] + centre[1]).astype(np.float32)
-    values = cv2.remap(
-        smooth,
-        u.reshape(-1, INWARD_SAMPLES),
-        v.reshape(-1, INWARD_SAMPLES),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    ).reshape(u.shape)
-    values = cv2.blur(values.reshape(len(u), -1), (1, 1)).reshape(u.shape).astype(np.float32)
-    change = np.abs(values[..., 2:] - values[..., :-2])
+    u = points[..., 0, None] - inward * profile.normal[:, 0, None, None] + centre[0]
+    v = points[..., 1, None] - inward * profile.normal[:, 1, None, None] + centre[1]
+    change = np.abs(steps(sampled(smooth, u, v)))
     depth = profile.rho[:, None] - np.quantile(blade.dots @ profile.normal.T, 0.85, axis=0)[:, None]
     within = inward[1:-1] < np.maximum(depth - 3, 0)
     strongest = np.where(within[:, None], change, 0).max(axis=2)
-    threshold = np.maximum(np.maximum(0.5 * step, 1.3 * blade.texture), 2.5 * noise)
+    threshold = np.maximum(np.maximum(0.7 * step, 1.7 * blade.texture), 3.0 * noise)
     return np.asarray((strongest > threshold[:, None]).mean(axis=1), float)
 
 
 def _parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noise: float) -> Array:
     """Share (k,) of the agreeing places whose step the other eye sees where the blade's surface puts it.
 
-    0.8 where the line's parallax against the far background is too small to tell them apart.
+    NaN where the line's parallax against the far background is too small to tell them apart.
     """
     stereo, surface = other.stereo, other.surface
-    height, width = other.smooth.shape
+    height, width = other.smooth.shape[:2]
     lines, places = profile.t.shape
     points = (profile.normal * profile.rho[:, None])[:, None] + profile.t[..., None] * profile.direction[:, None]
     across = np.arange(-5, 6, dtype=float)
@@ -232,20 +234,13 @@ def _parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noi
     shift = ((there - far).reshape(lines, places, 2) * profile.normal[:, None]).sum(axis=2)
     telling = np.abs(shift).mean(axis=1) > 6.0
     there = there.reshape(lines, places, 2)
-    u = (there[..., 0, None] + across * profile.normal[:, 0, None, None]).astype(np.float32)
-    v = (there[..., 1, None] + across * profile.normal[:, 1, None, None]).astype(np.float32)
-    values = cv2.remap(
-        other.smooth,
-        u.reshape(-1, len(across)),
-        v.reshape(-1, len(across)),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    ).reshape(u.shape)
-    gradient = values[..., 2:].astype(np.float32) - values[..., :-2].astype(np.float32)
+    u = there[..., 0, None] + across * profile.normal[:, 0, None, None]
+    v = there[..., 1, None] + across * profile.normal[:, 1, None, None]
+    gradient = steps(sampled(other.smooth, u, v))
     gradient = (gradient + np.roll(gradient, 1, 1) + np.roll(gradient, -1, 1)) / 3
     seen = (u[..., 5] > 4) & (v[..., 5] > 4) & (u[..., 5] < width - 5) & (v[..., 5] < height - 5)
     seen &= profile.agrees & beside
-    like = gradient * np.sign(profile.step)[..., None]
+    like = np.abs(gradient)
     strong = like.max(axis=2) > np.maximum(0.4 * np.abs(profile.step), 1.2 * noise)
     share = (strong & seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
-    return np.asarray(np.where(telling & (seen.sum(axis=1) >= 8), share, 0.8), float)
+    return np.asarray(np.where(telling & (seen.sum(axis=1) >= 8), share, np.nan), float)

@@ -134,9 +134,10 @@ def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:
 
 
 def without_spots(on: Image, off: Image, spots: Spots, reach: int = 5) -> Image:
-    """The laser-on image (h, w) with every spot painted over from the laser-off image, moved as `spots.motion` says."""
-    still = shifted(off, spots.motion) if spots.motion.any() else off
+    """The laser-on image (h, w) or (h, w, c) with every spot painted over from the laser-off image, moved as `spots.motion` says."""
     clean = on.copy()
+    still = shifted(off, spots.motion) if spots.motion.any() else off
+    still, clean = still.reshape(on.shape), clean
     for u, v in np.rint(spots.uv).astype(int).tolist():
         box = (slice(max(v - reach, 0), v + reach + 1), slice(max(u - reach, 0), u + reach + 1))
         clean[box] = still[box]

@@ -7,33 +7,32 @@ blade has dots on both sides or a weaker step than the edge. The edges of one bl
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.candidates import Blade, Candidate, OtherEye, weigh
 from vision.capture import Image
-from vision.lines import edge_pixels, grey_noise, hough_lines
+from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
 from vision.observation import Edge, Line
 
 Array = NDArray[np.float64]
 
 LARGEST_TAPER = np.deg2rad(16)
-LEAST_VALUE = 0.9
-SECOND_EDGE = 1.3  # how much less than the better edge the other one may be worth
+LEAST_VALUE = 1.2
+SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
 
 
 def find_edges(
-    grey: Image, blade: Blade, other: OtherEye | None
+    tones: Image, blade: Blade, other: OtherEye | None
 ) -> tuple[tuple[Candidate, ...], float, tuple[str, ...]]:
     """The blade's edges (none, one or two), the direction of its axis modulo π, and reasons where none is found.
 
-    grey (h, w): working image, free of dots. The axis is NaN where no edge gives it.
+    tones (h, w, c): working image, free of dots. The axis is NaN where no edge gives it.
     """
-    height, width = grey.shape
-    noise = grey_noise(grey)
-    lines, _ = hough_lines(edge_pixels(grey, noise), 220, (width, height))
-    candidates = weigh(lines, blade, cv2.blur(grey, (3, 3)), noise, other)
+    height, width = tones.shape[:2]
+    noise = sensor_noise(tones)
+    lines, _ = hough_lines(edge_pixels(tones, noise), 220, (width, height))
+    candidates = weigh(lines, blade, smoothed(tones), noise, other)
     chosen = _choose(candidates)
     if not chosen:
         best = max((c.support for c in candidates), default=0.0)

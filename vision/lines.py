@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 ANGLES = 90  # bins of 2° modulo 180°
 SPREAD = 2  # bins to each side that a pixel votes for: its gradient's direction is no better known
+MOST_PIXELS = 9000  # edge pixels that vote, the strongest
 RHO_STEP = 2.0  # px of the half-size image
 REACH = 7  # px across a candidate line within which its step is looked for
 SAMPLES = 96  # profiles along a candidate line
@@ -21,9 +22,9 @@ FOCUS_PX = 160.0  # standard deviation of the weight about the place where a ben
 SLOPE_HELD, BEND_HELD = 0.05, 1e-4  # what a fit of few steps is held to: slope, and change of slope per px over two
 
 
-def grey_noise(grey: Image) -> float:
-    """Standard deviation of the sensor noise, grey levels, from what a small blur takes away in the quiet half of the image."""
-    part = grey[::2]
+def sensor_noise(tones: Image) -> float:
+    """Standard deviation of the noise in grey levels, from what neighbours do not share in the quiet half of the image."""
+    part = tones[::2, :, 0]
     rough = part[:, 1:-1:5].astype(np.int16) * 2 - part[:, :-2:5] - part[:, 2::5]
     return max(0.6, 1.4826 * float(np.median(np.abs(rough))) / np.sqrt(6.0))
 
@@ -37,20 +38,73 @@ class Gradients:
     weight: Array
 
 
-def edge_pixels(grey: Image, noise: float) -> Gradients:
+def edge_pixels(tones: Image, noise: float) -> Gradients:
     """Pixels whose brightness changes by more than noise."""
-    half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    half = cv2.resize(tones, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     half = cv2.blur(half, (3, 3))
-    dx, dy = cv2.Sobel(half, cv2.CV_16S, 1, 0), cv2.Sobel(half, cv2.CV_16S, 0, 1)
-    strength = cv2.addWeighted(cv2.convertScaleAbs(dx), 0.5, cv2.convertScaleAbs(dy), 0.5, 0)
-    threshold = max(2.0, 1.6 * noise)
-    v, u = np.nonzero(strength[2:-2, 2:-2] > threshold)
+    planes = [half] if half.ndim == 2 else list(cv2.split(half))
+    dx, dy, strength = _sobel(planes[0])
+    for plane in planes[1:]:
+        other_dx, other_dy, other = _sobel(plane)
+        stronger = cv2.compare(other, strength, cv2.CMP_GT)
+        cv2.copyTo(other_dx, stronger, dx)
+        cv2.copyTo(other_dy, stronger, dy)
+        cv2.max(other, strength, strength)
+    ridge = _ridge(dx, dy, strength)
+    v, u = np.nonzero(ridge[2:-2, 2:-2] > max(2.0, 1.4 * noise))
     v, u = v + 2, u + 2
+    level = strength[v, u]
+    threshold = max(2.0, 1.4 * noise)
+    if len(u) > MOST_PIXELS:
+        threshold = max(threshold, float(np.partition(level, -MOST_PIXELS)[-MOST_PIXELS]))
+        keep = level >= threshold
+        v, u = v[keep], u[keep]
     gx, gy = dx[v, u].astype(np.float32), dy[v, u].astype(np.float32)
-    weight = np.minimum(np.hypot(gx, gy) / (8 * threshold), 1.0)
-    centre = (np.array(grey.shape[::-1]) - 1) / 2
+    weight = np.minimum(np.hypot(gx, gy) / (10 * threshold), 1.0)
+    centre = (np.array(tones.shape[1::-1]) - 1) / 2
     position = np.column_stack([u, v]) * 2 + 0.5 - centre
     return Gradients(position, np.arctan2(gy, gx), weight)
+
+
+def _sobel(plane: Image) -> tuple[NDArray[np.int16], NDArray[np.int16], Image]:
+    dx, dy = cv2.Sobel(plane, cv2.CV_16S, 1, 0), cv2.Sobel(plane, cv2.CV_16S, 0, 1)
+    strength = cv2.addWeighted(cv2.convertScaleAbs(dx), 0.5, cv2.convertScaleAbs(dy), 0.5, 0)
+    return dx, dy, strength
+
+
+def _ridge(dx: NDArray[np.int16], dy: NDArray[np.int16], strength: Image) -> Image:
+    """The strength where it is greatest across the step, zero elsewhere."""
+    upright = cv2.compare(cv2.convertScaleAbs(dx), cv2.convertScaleAbs(dy), cv2.CMP_GE)
+    highest = cv2.dilate(strength, np.ones((3, 1), np.uint8))
+    cv2.copyTo(cv2.dilate(strength, np.ones((1, 3), np.uint8)), upright, highest)
+    return np.asarray(cv2.copyTo(strength, cv2.compare(strength, highest, cv2.CMP_EQ)), np.uint8)
+
+
+def smoothed(tones: Image) -> Image:
+    """A 3 × 3 mean of tones (h, w, c), of the same shape."""
+    return np.asarray(cv2.blur(tones, (3, 3)), np.uint8).reshape(tones.shape)
+
+
+def sampled(image: Image, u: Array, v: Array) -> NDArray[np.float32]:
+    """Bilinear values (…, c) of an image (h, w, c) at pixels u, v (…); the border continues outward."""
+    flat = (-1, u.shape[-1])
+    values = cv2.remap(
+        image,
+        u.reshape(flat).astype(np.float32),
+        v.reshape(flat).astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    return np.asarray(values.reshape(*u.shape, -1), np.float32)
+
+
+def steps(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Central differences (…, n - 2) along the last but one axis of values (…, n, c): of the tone that changes most."""
+    change = values[..., 2:, :] - values[..., :-2, :]
+    if change.shape[-1] == 1:
+        return change[..., 0]
+    first, second = change[..., 0], change[..., 1]
+    return np.where(np.abs(first) >= np.abs(second), first, second)
 
 
 def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Array, Array]:
@@ -128,10 +182,10 @@ def refine_lines(
 ) -> Profiles:
     """Lines fitted to the steepest steps across each of K candidate lines, robustly.
 
-    smooth: the grey image after a 3 × 3 mean. normal (k, 2), rho (k,) in the image frame. focus (k,): the place along each
+    smooth: the tones (h, w, c) after a 3 × 3 mean. normal (k, 2), rho (k,) in the image frame. focus (k,): the place along each
     line around which it is to be right, where the edge bends.
     """
-    height, width = smooth.shape
+    height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     start, end = visible_stretch(normal, rho, centre - 3)
     share = np.linspace(0, 1, SAMPLES)
@@ -142,14 +196,9 @@ def refine_lines(
         (rho[:, None, None] + across) * normal[:, 0, None, None],
         (rho[:, None, None] + across) * normal[:, 1, None, None],
     )
-    u = (base[0] + t[..., None] * direction[:, 0, None, None] + centre[0]).astype(np.float32)
-    v = (base[1] + t[..., None] * direction[:, 1, None, None] + centre[1]).astype(np.float32)
-    flat = (-1, len(across))
-    values = cv2.remap(
-        smooth, u.reshape(flat), v.reshape(flat), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    ).reshape(u.shape)
-    values = values.astype(np.float32)
-    gradient = values[..., 2:] - values[..., :-2]
+    u = base[0] + t[..., None] * direction[:, 0, None, None] + centre[0]
+    v = base[1] + t[..., None] * direction[:, 1, None, None] + centre[1]
+    gradient = steps(sampled(smooth, u, v))
     gradient = (gradient + 0.5 * (np.roll(gradient, 1, 1) + np.roll(gradient, -1, 1))) / 2
     size = np.abs(gradient)
     best = np.argmax(size[..., 1:-1], axis=-1) + 1

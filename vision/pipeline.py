@@ -5,21 +5,20 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import RigGeometry
 from vision.capture import Image, StereoFrames
-from vision.chord import chord
+from vision.chord import chord, heading
 from vision.dots import Spots, find_spots, without_spots
 from vision.candidates import Blade, Candidate, OtherEye, texture_between
 from vision.edges import edge_of, find_edges
 from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser
-from vision.lines import grey_noise
+from vision.lines import sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots, Line, Tip
 from vision.quality import exposure, sharpness
-from vision.reduction import Reduced, reduce_image, reduction_factor, to_full
+from vision.reduction import green, reduce_image, reduction_factor, to_full, tones
 from vision.surface import Surface, fit_surface
 from vision.tip import find_tip
 
@@ -60,7 +59,7 @@ class Eye:
         missing = [name for name in ("left", "left_laser") if getattr(frames, name) is None]
         if missing:
             return self._refused(frames, watch, f"no {' and no '.join(missing)} image")
-        images: dict[str, Reduced] = {}
+        images: dict[str, Image] = {}
         for name in ("left", "left_laser", "right", "right_laser"):
             image: Image | None = getattr(frames, name)
             if image is not None:
@@ -68,8 +67,8 @@ class Eye:
                 images[name] = reduce_image(image, self.factor)
         watch.lap("reduce")
         both = "right" in images and "right_laser" in images
-        left = find_spots(images["left"].green, images["left_laser"].green)
-        right = find_spots(images["right"].green, images["right_laser"].green) if both else None
+        left = find_spots(green(images["left"]), green(images["left_laser"]))
+        right = find_spots(green(images["right"]), green(images["right_laser"])) if both else None
         watch.lap("dots")
         laser = self.geometry.laser
         if laser is None:
@@ -101,7 +100,7 @@ class Eye:
     def _outlined(
         self,
         frames: StereoFrames,
-        images: dict[str, Reduced],
+        images: dict[str, Image],
         left: Spots,
         right: Spots | None,
         rays: Array,
@@ -111,17 +110,17 @@ class Eye:
         watch: Stopwatch,
     ) -> BladeObservation:
         factor, camera = self.factor, self._stereo.left
-        grey = without_spots(images["left_laser"].grey, images["left"].grey, left)
-        smooth = cv2.blur(grey, (3, 3))
+        clean = without_spots(tones(images["left_laser"]), tones(images["left"]), left)
+        smooth = smoothed(clean)
         seeds = left.uv[blade.left]
         dots = seeds - camera.centre
         around = Blade(dots, self._absent(left, right, blade, surface), texture_between(smooth, seeds))
         other = None
         if right is not None:
-            other = OtherEye(cv2.blur(images["right_laser"].grey, (3, 3)), self._stereo, surface)
-        edges, axis, reasons = find_edges(grey, around, other)
+            other = OtherEye(smoothed(tones(images["right_laser"])), self._stereo, surface)
+        edges, axis, reasons = find_edges(clean, around, other)
         watch.lap("edges")
-        outline = find_tip(smooth, grey_noise(grey), edges, axis, dots)
+        outline = find_tip(smooth, sensor_noise(clean), edges, axis, dots)
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]
         width = chord(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
@@ -134,9 +133,9 @@ class Eye:
                 outline.point * factor,
                 outline.sigma_px * factor,
             )
-        heading, heading_sigma = _heading(edges, axis)
-        sharp = sharpness(grey, edges)
-        bright = exposure(images["left"].grey, seeds)
+        direction = heading(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
+        sharp = sharpness(clean, edges)
+        bright = exposure(images["left"], seeds)
         order = _left_first(edges, axis)
         dots_left = self._dots(left, rays, matches, surface)
         dots_right = None
@@ -163,8 +162,8 @@ class Eye:
             nearest_m=float(np.linalg.norm(points, axis=1).min()),
             edges=tuple(edge_of(edges[k], factor) for k in order),
             tip=tip,
-            heading=heading,
-            heading_sigma=heading_sigma,
+            heading=direction,
+            heading_sigma=_heading_sigma(edges),
             chord_m=width[0] if width else None,
             chord_sigma_m=width[1] if width else None,
             sharpness=sharp,
@@ -247,11 +246,11 @@ def _station_near(dots: Array, axis: float) -> Array:
     return along * float(np.clip(0.0, reach.min(), reach.max()))
 
 
-def _heading(edges: tuple[Candidate, ...], axis: float) -> tuple[float | None, float | None]:
+def _heading_sigma(edges: tuple[Candidate, ...]) -> float | None:
     if not edges:
-        return None, None
+        return None
     spread = float(np.sqrt(sum(e.profile.slope_sigma[e.index] ** 2 for e in edges))) / len(edges)
-    return axis, float(np.hypot(spread, np.deg2rad(0.2 if len(edges) == 2 else 1.5)))
+    return float(np.hypot(spread, np.deg2rad(0.2 if len(edges) == 2 else 1.5)))
 
 
 def _left_first(edges: tuple[Candidate, ...], axis: float) -> list[int]:

@@ -1,8 +1,6 @@
-"""Full images to the size that is worked on: halved with INTER_AREA until about 612 pixels wide, grey and green."""
+"""Full images to the size that is worked on: halved with INTER_AREA until about 612 pixels wide; green, and tones."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -14,14 +12,6 @@ Array = NDArray[np.float64]
 WORKING_WIDTH = 620
 
 
-@dataclass(frozen=True)
-class Reduced:
-    """One image at working size: `grey` (h, w) for outlines and `green` (h, w), where a green laser shows best."""
-
-    grey: Image
-    green: Image
-
-
 def reduction_factor(width: int) -> int:
     """The power of two that brings an image of this width to at most about 612 pixels."""
     factor = 1
@@ -30,15 +20,30 @@ def reduction_factor(width: int) -> int:
     return factor
 
 
-def reduce_image(image: Image, factor: int) -> Reduced:
-    """Average over blocks of factor × factor pixels, then take grey and green; a grey image serves as both."""
+def reduce_image(image: Image, factor: int) -> Image:
+    """The image averaged over blocks of factor × factor pixels."""
     while factor > 1:
         height, width = image.shape[0] // 2, image.shape[1] // 2
-        image = cv2.resize(image[: 2 * height, : 2 * width], (width, height), interpolation=cv2.INTER_AREA)
+        image = np.asarray(
+            cv2.resize(image[: 2 * height, : 2 * width], (width, height), interpolation=cv2.INTER_AREA), np.uint8
+        )
         factor //= 2
+    return image
+
+
+def green(image: Image) -> Image:
+    """The channel (h, w) in which a green laser shows best; a grey image is its own."""
+    return image if image.ndim == 2 else np.asarray(cv2.extractChannel(image, 1), np.uint8)
+
+
+def tones(image: Image) -> Image:
+    """What outlines are sought in, (h, w, 1 or 2): blue and red, in which a grey blade differs from sky, field and soil alike
+    and the laser hardly shows; a grey image as it is."""
     if image.ndim == 2:
-        return Reduced(image, image)
-    return Reduced(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.extractChannel(image, 1))
+        return image[:, :, None]
+    both = np.empty((*image.shape[:2], 2), np.uint8)
+    cv2.mixChannels([image], [both], [0, 0, 2, 1])
+    return both
 
 
 def to_full(pixels: Array, factor: int) -> Array:

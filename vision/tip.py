@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 from vision.candidates import Candidate
-from vision.lines import visible_stretch
+from vision.lines import sampled, visible_stretch
 
 Array = NDArray[np.float64]
 
 LANES = 25  # across the blade, from edge to edge
 STEP = 1.5  # px along a lane
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
-BOX = 5  # samples averaged on either side of a step
+BOX, LONG_BOX = 5, 18  # samples averaged on either side of a step, and on either side to tell it from a streak
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def _end_of(edge: Candidate, toward: Array) -> tuple[float, float]:
 def _closed_end(
     smooth: Image, noise: float, edges: tuple[Candidate, ...], toward: Array, dots: Array
 ) -> Outline | None:
-    height, width = smooth.shape
+    height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     across = np.array([-toward[1], toward[0]])
     last_dot = float(np.max(dots @ toward))
@@ -80,11 +80,12 @@ def _closed_end(
         return None
     lanes = low + wide * np.linspace(0.06, 0.94, LANES)
     s = np.arange(first, far, STEP)
-    u = (s * toward[0] + lanes[:, None] * across[0] + centre[0]).astype(np.float32)
-    v = (s * toward[1] + lanes[:, None] * across[1] + centre[1]).astype(np.float32)
-    strip = cv2.remap(smooth, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float32)
+    u = s * toward[0] + lanes[:, None] * across[0] + centre[0]
+    v = s * toward[1] + lanes[:, None] * across[1] + centre[1]
+    strip = sampled(smooth, u, v)
     outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
-    where, found = _lane_ends(strip, outside, s, noise, max(end - 0.35 * wide, _quiet_after(dots, toward)))
+    least = max(4.0, 2.0 * noise, 0.3 * min(edge.step for edge in edges))
+    where, found = _lane_ends(strip, outside, s, least, max(end - 0.35 * wide, _quiet_after(dots, toward)))
     if found.mean() < 0.6:
         return None
     return _outline(lanes, where, found, toward, across, last_dot, border, wide)
@@ -110,18 +111,16 @@ def _strip(edges: tuple[Candidate, ...], toward: Array, across: Array, dots: Arr
 
 
 def _lane_ends(
-    strip: Array, outside: NDArray[np.bool_], s: Array, noise: float, from_s: float
+    strip: Array, outside: NDArray[np.bool_], s: Array, least: float, from_s: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Where each lane (row of `strip`) steps first and clearly after `from_s`, and whether it does."""
-    sums = np.cumsum(np.pad(strip, ((0, 0), (1, 0))), axis=1)
-    before = (sums[:, BOX:-BOX] - sums[:, : -2 * BOX]) / BOX
-    after = (sums[:, 2 * BOX :] - sums[:, BOX:-BOX]) / BOX
-    size = np.abs(after - before)
+    short, long = _change(strip, BOX), _change(strip, LONG_BOX)
+    size = np.where(long > 0.5 * short, short, 0.0)[:, BOX:-BOX]
     place = s[BOX : BOX + size.shape[1]] - STEP / 2
     size[:, place < from_s] = 0
     size[outside[:, BOX : BOX + size.shape[1]]] = 0
     biggest = size.max(axis=1)
-    threshold = np.maximum(0.45 * biggest, max(4.0, 2.0 * noise))
+    threshold = np.maximum(0.45 * biggest, least)
     reached = size > threshold[:, None]
     first = reached.argmax(axis=1)
     found = reached.any(axis=1)
@@ -135,6 +134,14 @@ def _lane_ends(
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = np.where(bend < 0, 0.5 * (a - c) / bend, 0.0)
     return place[inner] + STEP * np.clip(shift, -1, 1), found
+
+
+def _change(strip: Array, box: int) -> Array:
+    """Change (lanes, samples) of the mean over `box` samples before and after each place, of the tone that changes most."""
+    padded = np.pad(strip, ((0, 0), (box, box), (0, 0)), mode="edge")
+    sums = np.cumsum(np.pad(padded, ((0, 0), (1, 0), (0, 0))), axis=1)
+    mean = (sums[:, box:] - sums[:, :-box]) / box
+    return np.abs(mean[:, box : box + strip.shape[1]] - mean[:, : strip.shape[1]]).max(axis=2)
 
 
 def _outline(
