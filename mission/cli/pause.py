@@ -12,7 +12,12 @@ def pause(
     run: Annotated[Path | None, typer.Argument(help="The run's folder or name; without it the one that flies.")] = None,
     record: Annotated[Path, typer.Option(metavar="DIR", help="Where runs leave their folders.")] = Path("logs"),
 ) -> None:
-    """Hold position, laser off, until `mission resume`. The battery, the wind and everything else stay watched."""
+    """Hold position, laser off, until `mission resume`. The battery, the wind and everything else stay watched.
+
+    \b
+    Example:
+      mission pause
+    """
     from mission.cli.command import say
 
     say("pause", run, record)

@@ -12,7 +12,12 @@ def resume(
     run: Annotated[Path | None, typer.Argument(help="The run's folder or name; without it the one that flies.")] = None,
     record: Annotated[Path, typer.Option(metavar="DIR", help="Where runs leave their folders.")] = Path("logs"),
 ) -> None:
-    """Go on after `mission pause`. A run that was interrupted goes on with `mission run --resume` instead."""
+    """Go on after `mission pause`. A run that was interrupted goes on with `mission run --resume` instead.
+
+    \b
+    Example:
+      mission resume
+    """
     from mission.cli.command import say
 
     say("resume", run, record)

@@ -13,7 +13,12 @@ def skip(
     run: Annotated[Path | None, typer.Argument(help="The run's folder or name; without it the one that flies.")] = None,
     record: Annotated[Path, typer.Option(metavar="DIR", help="Where runs leave their folders.")] = Path("logs"),
 ) -> None:
-    """Leave the present state for one that the mission marks with `entry: true`."""
+    """Leave the present state for one that the mission marks with `entry: true`.
+
+    \b
+    Example:
+      mission skip inspect.blade.trailing
+    """
     from mission.cli.command import say
 
     say("skip", run, record, target=state)

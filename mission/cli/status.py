@@ -13,7 +13,13 @@ def status(
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as one JSON document.")] = False,
     record: Annotated[Path, typer.Option(metavar="DIR", help="Where runs leave their folders.")] = Path("logs"),
 ) -> None:
-    """Print the state, its deadline, what may come next and what blocks it."""
+    """Print the state, its deadline, what may come next and what blocks it.
+
+    \b
+    Examples:
+      mission status
+      mission status --json
+    """
     import json
 
     from mission.cli.command import reach

@@ -13,7 +13,13 @@ def step(
     no: Annotated[bool, typer.Option("--no", help="Do not take the transition; the vehicle holds.")] = False,
     record: Annotated[Path, typer.Option(metavar="DIR", help="Where runs leave their folders.")] = Path("logs"),
 ) -> None:
-    """Take the transition that waits for a yes, in a run flown with --autonomy confirm or manual."""
+    """Take the transition that waits for a yes, in a run flown with --autonomy confirm or manual.
+
+    \b
+    Examples:
+      mission step
+      mission step --no
+    """
     from mission.cli.command import say
 
     say("step", run, record, yes=not no)
