@@ -18,16 +18,27 @@ GREEN = (0.30, 1.0, 0.22)  # what blue, green and red pixels make of the laser's
 
 
 @compiled
-def add_spots(image: Any, centres: Any, amplitude: Any, sigma: Any, streak: Any) -> None:
+def add_spots(
+    image: Any, centres: Any, amplitude: Any, sigma: Any, streak: Any, own: Any, seen: Any, part: Any
+) -> None:
     """Add Gaussian spots of green light to image (h, w, 3): centres (n, 2) px, amplitude (n,) grey values, sigma (n,)
-    px and streak (n,) px, by which a spot is longer to the right than high. Values saturate at 255."""
+    and streak (n,) px, by which a spot is longer to the right than high. Values saturate at 255.
+
+    Light falls only on the part own (n,) that a spot lies on, as far as seen (of `raster.visibility`, or empty) and
+    part (triangles,) tell: at an edge the rest of the beam goes past.
+    """
     height, width = image.shape[:2]
+    factor = seen.shape[0] // height
     for i in range(len(centres)):
         u, v, s, long = centres[i, 0], centres[i, 1], sigma[i], streak[i]
         reach = 3.5 * s
         for y in range(max(int(np.ceil(v - reach)), 0), min(int(np.floor(v + reach)), height - 1) + 1):
             begin, end = max(int(np.ceil(u - reach - long / 2)), 0), min(int(np.floor(u + reach + long / 2)), width - 1)
             for x in range(begin, end + 1):
+                if factor > 0:
+                    t = seen[y * factor + factor - 1, x * factor + factor - 1]
+                    if t < 0 or part[t] != own[i]:
+                        continue
                 away = max(abs(x - u) - long / 2, 0.0)
                 value = amplitude[i] * np.exp(-(away * away + (y - v) ** 2) / (2 * s * s))
                 for c in range(3):

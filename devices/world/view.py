@@ -77,6 +77,7 @@ class Renderer:
         self._tiles = surroundings(settings.light, settings.seed)
         self._points = np.empty_like(mesh.vertices)
         self._buffers: dict[tuple[int, int], tuple[NDArray[np.float32], NDArray[np.int32]]] = {}
+        self._seen = np.empty((0, 0), np.int32)
         self._sensors: dict[tuple[int, int], Sensor] = {}
         self._lenses: dict[Camera, _Distortion] = {}
 
@@ -103,6 +104,7 @@ class Renderer:
         pinhole = camera if lens is None else lens.pinhole
         settings = self.settings
         inverse, seen = self.visibility(pinhole, pose, 2 if settings.camera.antialias else 1)
+        self._seen = seen
         image = background(
             self._tiles,
             (pinhole.width, pinhole.height),
@@ -171,7 +173,7 @@ class Renderer:
         return float(np.median(distance) if np.median(distance) < 60 else distance.min())
 
     def add_laser(self, image: Image, spots: Spots, camera: Camera, pose: CameraPose) -> None:
-        """Draw the spots that this camera sees into its image (h, w, 3)."""
+        """Draw the spots that this camera sees into its image (h, w, 3), the last that `scenery` drew."""
         pixels, which = self.seen_spots(spots, camera, pose)
         distance = np.linalg.norm(spots.points[which] - pose.position, axis=1)
         share = np.maximum(distance, 0.5) / SPOT_AT_M
@@ -179,7 +181,8 @@ class Renderer:
         amplitude = SPOT_GREY * albedo * share**-SPOT_FALL * np.sqrt(spots.cosine[which])
         sigma = np.maximum(camera.fx * SPOT_RAD * share**-0.5, 0.6)
         streak = np.full(len(which), self.settings.camera.streak_px * camera.width / 612.0)
-        add_spots(image, pixels, amplitude, sigma, streak)
+        seen = self._seen if self._distortion(camera) is None else np.empty((0, 0), np.int32)
+        add_spots(image, pixels, amplitude, sigma, streak, spots.part[which], seen, self.mesh.part)
 
     def sensor(self, camera: Camera) -> Sensor:
         """The sensor of a camera of this size."""

@@ -64,7 +64,9 @@ def test_silhouette_lies_within_a_pixel_and_depth_within_a_millimetre_of_ray_cas
         ours, theirs = view.part == number, part == number
         cross = np.ones((3, 3), bool)
         assert not (ours & ~binary_dilation(theirs, cross)).any(), f"part {number} is drawn more than a pixel too wide"
-        assert not (theirs & ~binary_dilation(ours, cross)).any(), f"part {number} is drawn more than a pixel too narrow"
+        assert not (theirs & ~binary_dilation(ours, cross)).any(), (
+            f"part {number} is drawn more than a pixel too narrow"
+        )
     assert (view.part != part).mean() < 0.002
     both = (view.part == part) & np.isfinite(depth)
     error = np.abs(view.depth[both] - depth[both])
