@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 Autonomy = Literal["full", "confirm", "manual"]
 PULSE_S = 0.1  # of the event loop: the executive shows at least this often that it is alive
+STALLED_S = 0.8  # of the event loop: after such a gap the autopilot may have left OFFBOARD
+KEEP_S = 2.0  # how often the journal is told what a behaviour has found out and how far it has come
 _MOST_FAULTS = 3
 
 
@@ -98,18 +100,27 @@ class Executive:
         self._pending: Queued | None = None
         self._ignored: set[str] = set()
         self._remembered: dict[str, Any] = {}
+        self._station_m: float | None = None
         self._paused = False
         self._ended: str | None = None
         self._faults = 0
+        self._alive_s = 0.0
+        self._kept_s = 0.0
         self._loop: asyncio.AbstractEventLoop | None = None
         self._asking: set[asyncio.Task[None]] = set()
         journal.on_lost = self._journal_lost
 
     # What others call
 
+    @property
+    def state(self) -> str:
+        """Path of the active leaf."""
+        return self._machine.state
+
     async def run(self) -> Outcome:
         """Fly until a final state is reached."""
         self._loop = asyncio.get_running_loop()
+        self._alive_s = self._loop.time()
         watching = self._loop.create_task(self._watcher.run(self._clock), name="monitors")
         try:
             self._journal.append(
@@ -249,6 +260,9 @@ class Executive:
     async def _act_on_time(self) -> None:
         """Deadlines cancel the work that they time; transitions whose delay is over are taken if they still can be."""
         now = self._clock.now()
+        if now - self._kept_s >= KEEP_S:
+            self._kept_s = now
+            self._journal_memory(now)
         late = self._timing.overdue(now)
         if late is not None:
             self._timing = self._timing.expired(late)
@@ -416,6 +430,11 @@ class Executive:
         self.services.log.warning("let go of the vehicle")
 
     def _alive(self) -> None:
+        """Say that the executive is alive; notice if it was not."""
+        now = asyncio.get_running_loop().time()
+        gap, self._alive_s = now - self._alive_s, now
+        if gap > STALLED_S and self._setpoints.target is not None:
+            self._queue.put("setpoints_stalled", {"gap_s": round(gap, 2)})
         stroke = getattr(self._setpoints, "stroke", None)
         if stroke is not None:
             stroke()
@@ -468,6 +487,10 @@ class Executive:
         if memory != self._remembered:
             self._remembered = memory
             self._journal.append("memory", now, **memory)
+        station = self.services.progress.station_m
+        if station is not None and round(station, 1) != self._station_m:
+            self._station_m = round(station, 1)
+            self._journal.append("progress", now, state=self._machine.state, station_m=self._station_m)
 
     def _snapshot(self, was_ours: bool = True) -> Snapshot:
         state = self.mission.states[self._machine.state]

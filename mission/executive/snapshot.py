@@ -108,7 +108,7 @@ def take(
         vision_age_s=getattr(perception, "vision_age_s", None),
         seen=accepted_s is not None and (watched_s is None or accepted_s >= watched_s),
         needs_vision=needs_vision,
-        streaming=bool(getattr(setpoints, "streaming", setpoints.target is not None)),
+        streaming=setpoints.target is not None,
         standoff_m=standoff_m,
         was_ours=was_ours,
         home=services.memory.home,

@@ -346,3 +346,29 @@ def test_an_error_of_the_executive_itself_becomes_an_abort(fly: Any, monkeypatch
     monkeypatch.setattr(Executive, "_go", broken)
     assert flight.run().outcome == "aborted"
     assert any(kind == "fault" for kind, _ in flight.journal)
+
+
+def test_a_loop_that_was_blocked_is_noticed(fly: Any) -> None:
+    async def blocking(services: Any, parameters: Any) -> str:
+        asyncio.get_running_loop().pass_time(3.0)  # type: ignore[attr-defined]
+        await services.clock.sleep(100.0)
+        return "done"
+
+    flight = fly({"fly": {"do": "blocking", "on": {"setpoints_stalled": "aborted"}}, **END}, {"blocking": blocking})
+    assert flight.run().outcome == "aborted"
+
+
+def test_what_was_found_out_is_in_the_journal_before_the_state_is_left(fly: Any) -> None:
+    async def finding(services: Any, parameters: Any) -> str:
+        services.memory.hub = (1.0, 2.0, 3.0)
+        for station in range(10):
+            services.progress.station_m = float(station)
+            await services.clock.sleep(1.0)
+        return "done"
+
+    flight = fly({"fly": {"do": "finding", "on": {"done": "completed"}}, **END}, {"finding": finding})
+    flight.run()
+    kinds = [kind for kind, _ in flight.journal]
+    assert kinds.index("memory") < kinds.index("transition")
+    stations = [fields["station_m"] for kind, fields in flight.journal if kind == "progress"]
+    assert stations == sorted(stations) and len(stations) >= 4
