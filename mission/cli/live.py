@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import select
 import signal
@@ -10,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
 from mission.cli.scene import Scene, VisionRate, take_scene
@@ -24,7 +26,9 @@ REFRESH_S = 0.25
 QUIET_S = 10.0
 """Without news a plain view says every so often that the flight goes on."""
 
-KEYS = {"p": "paused", "r": "resumed", "s": "step", "a": "abort"}
+KEYS = {"p": "pause", "r": "resume", "s": "step", "a": "abort"}
+SAID_S = 6.0
+"""How long the answer to a key stays on the screen."""
 
 
 class View(Protocol):
@@ -136,6 +140,13 @@ class LiveView(_Watcher):
         self._question: str | None = None
         self._answer: Callable[[bool], None] = lambda yes: None
         self._asking = threading.Lock()
+        self._said = (-SAID_S, "")
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def start(self, executive: Executive) -> None:
+        with contextlib.suppress(RuntimeError):
+            self._loop = asyncio.get_running_loop()
+        super().start(executive)
 
     def ask(self, question: str) -> bool:
         if self._thread is None:
@@ -169,7 +180,8 @@ class LiveView(_Watcher):
                     if question is not None and scene.question is None:
                         self._settle(False)  # something else happened: nobody waits for this answer any more
                     scene = replace(scene, events=tuple(self._events))
-                    live.update(draw(scene, self._question, str(self._folder.path)), refresh=True)
+                    said = self._said[1] if time.monotonic() - self._said[0] < SAID_S else ""
+                    live.update(draw(scene, self._question, said, str(self._folder.path)), refresh=True)
                 for key in pressed(REFRESH_S):
                     self._press(executive, key)
 
@@ -178,9 +190,20 @@ class LiveView(_Watcher):
             if key in "yYnN":
                 self._settle(key in "yY")
             return
-        name = KEYS.get(key.lower())
-        if name is not None:
-            act(executive, name)
+        command = KEYS.get(key.lower())
+        if command is None:
+            return
+        if self._loop is None:
+            self._obey(executive, command)
+        else:
+            self._loop.call_soon_threadsafe(self._obey, executive, command)
+
+    def _obey(self, executive: Executive, command: str) -> None:
+        """On the executive's loop, as a command from another shell would be followed."""
+        from mission.executive.operator import obey
+
+        at = datetime.now(UTC).isoformat(timespec="milliseconds")
+        self._said = (time.monotonic(), obey(executive, {"command": command}, "keyboard", at).text)
 
     def _settle(self, yes: bool) -> None:
         self._question = None
@@ -198,11 +221,6 @@ def _prompt(question: str) -> bool:
     finally:
         if before is not None:
             signal.signal(signal.SIGINT, before)
-
-
-def act(executive: Executive, name: str) -> None:
-    """Raise an operator's event from the view's thread."""
-    executive.raise_event_threadsafe(name, by="keyboard")
 
 
 @contextlib.contextmanager

@@ -15,8 +15,8 @@ ROWS_NEXT = 5
 ROWS_EVENTS = 5
 
 
-def draw(scene: Scene, question: str | None = None, footer: str = "") -> RenderableType:
-    """One panel, sixty columns or wider."""
+def draw(scene: Scene, question: str | None = None, said: str = "", footer: str = "") -> RenderableType:
+    """One panel, sixty columns or wider. said: the answer to the operator's last key."""
     rows = Table.grid(padding=(0, 1), expand=True)
     rows.add_column(style="dim", width=9)
     rows.add_column(ratio=1)
@@ -31,6 +31,8 @@ def draw(scene: Scene, question: str | None = None, footer: str = "") -> Rendera
     rows.add_row("", "")
     rows.add_row("events", _events(scene.events))
     parts: list[RenderableType] = [rows, *(Text(f"  {alarm}", "bold white on red") for alarm in scene.alarms)]
+    if said:
+        parts.append(Text(f"  {said}", "bold cyan"))
     if question is not None:
         parts.append(Panel(Text.assemble((question, "bold"), "  y / n"), border_style="yellow"))
     how = f"simulated × {scene.speed:g}" if scene.simulated else "[bold red]real vehicle[/]"

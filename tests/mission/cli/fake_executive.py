@@ -54,7 +54,10 @@ class FakeExecutive:
             ended=None,
         )  # fmt: skip
 
-    def raise_event_threadsafe(self, name: str, **data: Any) -> None:
+    def answers(self, name: str) -> bool:
+        return True
+
+    def raise_event(self, name: str, **data: Any) -> None:
         self.raised.append(name)
         with self._journal.open("a") as file:
             file.write(

@@ -174,7 +174,7 @@ def test_keys_reach_the_executive_and_the_terminal_is_as_before_afterwards(tmp_p
     try:
         terminal.wait_for("leading")
         terminal.press("p")
-        terminal.wait_for("paused")
+        terminal.wait_for("pausing: the vehicle holds its position")
         terminal.press("xa")
         terminal.wait_for("raised ['paused', 'abort']")
         assert terminal.process.wait(20) == 0
