@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from mission.executive.stage import FlightError, Stage, lockstep_stage, wall_sta
 
 if TYPE_CHECKING:
     from flight.turbine import Turbine
-    from mission.executive.executive import Ask, Executive, Question
+    from mission.executive.executive import Ask, Autonomy, Executive, Question
     from mission.executive.journal import Journal
     from mission.language.document import Mission
     from mission.record.folder import RunFolder
@@ -42,7 +42,7 @@ class FlightOptions:
     speed: float | None = None
     lockstep: bool = False
     system: str | None = None
-    autonomy: str = "full"
+    autonomy: Autonomy = "full"
     confirm: Callable[[str], bool] = lambda question: False
     on_start: Callable[[Executive], None] = lambda executive: None
     resume: Path | None = None
@@ -82,6 +82,7 @@ async def _fly(options: FlightOptions, stage: Stage, log: Any) -> FlightResult:
     """Connect, fly, and close everything that was opened, whatever happens."""
     from flight.autopilot import AutopilotError
     from mission.executive.journal import Journal
+    from mission.executive.operator import serving
     from mission.record.recorder import RunRecorder
 
     recorder = journal = None
@@ -99,8 +100,10 @@ async def _fly(options: FlightOptions, stage: Stage, log: Any) -> FlightResult:
         loop = asyncio.get_running_loop()
         tasks = [loop.create_task(work, name=name) for name, work in running.items()]
         options.on_start(executive)
+        listening = nullcontext() if options.lockstep else serving(executive, options.folder.path)
         with interrupting(executive):
-            outcome = await executive.run()
+            async with listening:
+                outcome = await executive.run()
         return FlightResult(outcome.outcome, outcome.final_state, outcome.interrupted)
     finally:
         for task in tasks:
@@ -118,16 +121,17 @@ def _compose(
     options: FlightOptions, stage: Stage, journal: Journal, recorder: RunRecorder, log: Any
 ) -> tuple[Executive, dict[str, Coroutine[Any, Any, None]]]:
     """The executive with its services, and what has to run beside it, by name."""
-    from vision.far_view import find_rotor
-
     from flight.keepout import KeepOut
     from flight.setpoints import SetpointStream
     from mission.executive.executive import Executive
     from mission.executive.perception import VisionLoop
     from mission.executive.services import Services
+    from vision.far_view import find_rotor
     from vision.pipeline import Eye
     from vision.tracker import BladeTracker
 
+    executive: Executive
+    services: Services
     mission = options.mission
     camera = stage.rig.geometry.stereo.left
     turbine = surveyed_turbine(mission)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from vision.camera import Camera, LaserGrid, RigGeometry, StereoPair
 from vision.capture import rotation_of
 
 if TYPE_CHECKING:
+    from mission.executive.perception import FarSight
     from mission.language.document import Mission
     from mission.language.rig_file import RigFile
 
@@ -83,3 +85,13 @@ def _laser(rig: RigFile) -> LaserGrid:
         np.array(rig.laser.position_m),
         rotation_of(roll, pitch, yaw),
     )
+
+
+def located(turbine: Turbine, camera: Camera, sights: Sequence[FarSight]) -> Turbine | None:
+    """The turbine as several pictures from afar show it; None where they do not agree on a rotor.
+
+    The blade to inspect is the one whose azimuth is nearest to what was believed.
+    """
+    from vision.triangulation import locate_rotor
+
+    raise NotImplementedError(locate_rotor)

@@ -10,14 +10,15 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from flight.autopilot import Setpoint
 from mission.behaviours.behaviour import behaviours
 from mission.executive import snapshot as snapshots
-from mission.executive.events import EVENTS, Severity, event
+from mission.executive.decision import Autonomy, autonomy_after, decide
+from mission.executive.events import EVENTS, event
 from mission.executive.gate import Gate, guard_services
-from mission.executive.journal import Journal
+from mission.executive.journal import FORMAT, Journal
 from mission.executive.machine import Machine, entries
 from mission.executive.queue import EventQueue, Queued
 from mission.executive.snapshot import Snapshot
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from mission.executive.clock import Clock
     from mission.executive.services import Services
 
-Autonomy = Literal["full", "confirm", "manual"]
 PULSE_S = 0.1  # of the event loop: the executive shows at least this often that it is alive
 STALLED_S = 0.8  # of the event loop: after such a gap the autopilot may have left OFFBOARD
 KEEP_S = 2.0  # how often the journal is told what a behaviour has found out and how far it has come
@@ -128,9 +128,12 @@ class Executive:
                 self._clock.now(),
                 mission=self.mission.name,
                 version=self.mission.version,
+                format=FORMAT,
                 autonomy=self.autonomy,
                 resumed=self._resumed,
                 state=self._machine.state,
+                history=self._machine.configuration.history,
+                taken=self._machine.configuration.taken,
             )
             now = self._clock.now()
             self._timing = self._timing.entering(self.mission, tuple(reversed(self._machine.configuration.active)), now)
@@ -198,11 +201,6 @@ class Executive:
     def answers(self, name: str) -> bool:
         """Whether the event would lead anywhere now."""
         return self._machine.choose(name, self._quantities()) is not None
-
-    @property
-    def state(self) -> str:
-        """Path of the active leaf."""
-        return self._machine.state
 
     def status(self) -> Status:
         """One glance at the run."""
@@ -284,27 +282,21 @@ class Executive:
             self.confirm(True)
             return
         quantities = self._quantities()
-        transition = self._transition(queued, quantities)
-        if transition is None:
-            self._journal_event(queued, "ignored", quantities)
+        decision = decide(self.mission, self._machine.configuration, queued, quantities, self.autonomy)
+        self._journal_event(queued, decision.led_to, quantities)
+        transition = decision.transition
+        if decision.led_to == "ignored":
             self._unanswered(queued)
-        elif queued.only is None and (delay := semantics.delay_s(transition, self._machine.configuration)) > 0:
-            self._journal_event(queued, "delayed", quantities)
-            self._timing = self._timing.delaying(Waiting(self._clock.now() + delay, queued.name, transition))
-        elif not queued.confirmed and self._needs_yes(queued, transition):
-            self._journal_event(queued, "asked", quantities)
+        elif transition is None:
+            return
+        elif decision.led_to == "delayed":
+            waiting = Waiting(self._clock.now() + decision.delay_s, queued.name, transition)
+            self._timing = self._timing.delaying(waiting)
+        elif decision.led_to == "asked":
             self._pending = replace(queued, only=transition)
             self._put_question(self._pending)
         else:
-            self._journal_event(queued, "transition", quantities)
             await self._go(queued, transition, quantities)
-
-    def _transition(self, queued: Queued, quantities: semantics.Quantities) -> Transition | None:
-        configuration, only = self._machine.configuration, queued.only
-        if only is None:
-            return self._machine.choose(queued.name, quantities, queued.origin)
-        able = not semantics.used_up(only, configuration) and semantics.guards_hold(only, quantities)
-        return only if able and (not only.source or only.source in configuration.active) else None
 
     async def _go(self, queued: Queued, transition: Transition, quantities: semantics.Quantities) -> None:
         """One transition: stop, journal, move, start."""
@@ -330,8 +322,7 @@ class Executive:
         self._timing = self._timing.stepping(self.mission, step, now)
         self._pending = None
         self._paused = transition.event == "paused"
-        if transition.event == "abort":
-            self.autonomy = "full"  # an abort waits for nobody's yes
+        self.autonomy = autonomy_after(transition, self.autonomy)
         for name in self._ignored:
             self._watcher.rearm(name)
         self._ignored.clear()
@@ -386,11 +377,6 @@ class Executive:
             self._ended = "aborted"
         elif queued.activation is not None and queued.name not in EVENTS:
             self._queue.put("behaviour_failed", {"error": f"nothing answers its outcome {queued.name!r}"})
-
-    def _needs_yes(self, queued: Queued, transition: Transition) -> bool:
-        if event(queued.name).severity is not Severity.INFO or self.autonomy == "full":
-            return False
-        return self.autonomy == "manual" or transition.confirm
 
     def _put_question(self, pending: Queued) -> None:
         if self._ask is None or self._loop is None:

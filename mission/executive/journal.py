@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+FORMAT = 1  # of the journal, as its first line says
 _SLOWEST_DISK_S = 1.0  # a disk that takes longer must not hold up the flight
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from vision.estimate import BladeEstimate, BladeFrame
     from vision.tracker import BladeTracker, UpdateResult
 
+TIPS_KEPT = 20
 POSE_WAIT_S = 0.5  # how long a late telemetry pose is waited for before a frame is given up
 
 
@@ -92,7 +92,7 @@ class VisionLoop:
         """Start afresh with another idea of where the blade lies, as after the survey."""
         self.frame = frame
         self.tracker = self._new_tracker(frame)
-        self.tips: deque[TipSighting] = deque(maxlen=20)
+        self.tips: Sequence[TipSighting] = ()
         self.edge_map = EdgeMap()
 
     @property
@@ -149,7 +149,7 @@ class VisionLoop:
 
     def forget(self) -> None:
         self.tracker.forget()
-        self.tips.clear()
+        self.tips = ()
 
     def record(self, side: str | None) -> None:
         self._side = side
@@ -191,7 +191,7 @@ class VisionLoop:
             self.edge_map.add(estimate)
             sighting = sight_tip(observation, estimate, pose, self.frame, self._rig.geometry.stereo.left)
             if sighting is not None:
-                self.tips.append(sighting)
+                self.tips = (*self.tips[-TIPS_KEPT + 1 :], sighting)
         self._sink.cycle(frames, observation, update, estimate, side)
         self.observation = observation
         async with self._cycle:

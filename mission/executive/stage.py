@@ -92,7 +92,7 @@ def wall_stage(options: FlightOptions) -> Iterator[Stage]:
             system,
             clock,
             simulated=world is not None,
-            gimbal="in_process" if rig_file.gimbal == "in_process" else "autopilot",
+            gimbal="process" if rig_file.gimbal == "in_process" else "mavlink",
         )
         rig, switch = _rig(options, stack, world, vehicle, clock, autopilot)
         stack.callback(rig.close)
