@@ -57,9 +57,10 @@ def _cast(
 def cast(mesh: Mesh, origins: Array, rays: Array, reach: float | Array) -> tuple[Array, NDArray[np.int32]]:
     """First hits of unit rays (n, 3) from origins (n, 3) or (3,) in local NED: distance (n,) m, at most `reach`, and
     the triangle (n,), -1 where nothing was hit."""
-    rays = np.ascontiguousarray(rays, float).reshape(-1, 3)
-    origins = np.ascontiguousarray(np.broadcast_to(origins, rays.shape), float)
-    reach = np.ascontiguousarray(np.broadcast_to(reach, len(rays)), float)
+    # Copies, for a kernel is compiled anew for arrays that cannot be written to.
+    rays = np.array(rays, float, order="C").reshape(-1, 3)
+    origins = np.array(np.broadcast_to(origins, rays.shape), float, order="C")
+    reach = np.array(np.broadcast_to(reach, len(rays)), float, order="C")
     distance, hit = _cast(origins, rays, reach, mesh.vertices, mesh.triangles, mesh.start, mesh.centre, mesh.radius)
     return distance, hit
 
