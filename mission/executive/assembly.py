@@ -33,8 +33,8 @@ class FlightOptions:
     """What `mission run` was asked to do, checked and typed.
 
     speed, system: None for the rig file's. confirm: asked before a real vehicle is armed and, with autonomy below full,
-    before marked transitions. on_start: called with the executive once it exists (for the live view). resume: the folder
-    of an interrupted run to go on with.
+    before marked transitions. on_start: called with the executive once it exists, for the live view. resume: the
+    folder of an interrupted run to go on with.
     """
 
     mission: Mission
@@ -141,6 +141,7 @@ def _compose(
         KeepOut(turbine, mission.limits.clearance_m),
         on_sent=recorder.sent,
         on_event=lambda name: executive.raise_event(name),
+        **({"wall": stage.clock.now} if options.lockstep else {}),
     )
     perception = VisionLoop(
         rig=stage.rig,
