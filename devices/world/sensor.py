@@ -19,13 +19,14 @@ GREEN = (0.30, 1.0, 0.22)  # what blue, green and red pixels make of the laser's
 
 @compiled
 def add_spots(
-    image: Any, centres: Any, amplitude: Any, sigma: Any, streak: Any, own: Any, seen: Any, part: Any
+    image: Any, centres: Any, amplitude: Any, sigma: Any, streak: Any, own: Any, seen: Any, part: Any, shift: Any
 ) -> None:
     """Add Gaussian spots of green light to image (h, w, 3): centres (n, 2) px, amplitude (n,) grey values, sigma (n,)
     and streak (n,) px, by which a spot is longer to the right than high. Values saturate at 255.
 
     Light falls only on the part own (n,) that a spot lies on, as far as seen (of `raster.visibility`, or empty) and
-    part (triangles,) tell: at an edge the rest of the beam goes past.
+    part (triangles,) tell: at an edge the rest of the beam goes past. shift (2,): whole pixels right and down by which
+    the image was moved since `seen`.
     """
     height, width = image.shape[:2]
     factor = seen.shape[0] // height
@@ -36,7 +37,9 @@ def add_spots(
             begin, end = max(int(np.ceil(u - reach - long / 2)), 0), min(int(np.floor(u + reach + long / 2)), width - 1)
             for x in range(begin, end + 1):
                 if factor > 0:
-                    t = seen[y * factor + factor - 1, x * factor + factor - 1]
+                    row = min(max(y - shift[1], 0), height - 1) * factor
+                    column = min(max(x - shift[0], 0), width - 1) * factor
+                    t = seen[row + factor - 1, column + factor - 1]
                     if t < 0 or part[t] != own[i]:
                         continue
                 away = max(abs(x - u) - long / 2, 0.0)

@@ -172,8 +172,11 @@ class Renderer:
         distance, _ = cast(self.mesh, pose.position, rays @ pose.rotation.T, 60.0)
         return float(np.median(distance) if np.median(distance) < 60 else distance.min())
 
-    def add_laser(self, image: Image, spots: Spots, camera: Camera, pose: CameraPose) -> None:
-        """Draw the spots that this camera sees into its image (h, w, 3), the last that `scenery` drew."""
+    def add_laser(
+        self, image: Image, spots: Spots, camera: Camera, pose: CameraPose, shift: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """Draw the spots that this camera sees into its image (h, w, 3), the last that `scenery` drew, moved since then
+        by so many pixels right and down."""
         pixels, which = self.seen_spots(spots, camera, pose)
         distance = np.linalg.norm(spots.points[which] - pose.position, axis=1)
         share = np.maximum(distance, 0.5) / SPOT_AT_M
@@ -182,7 +185,8 @@ class Renderer:
         sigma = np.maximum(camera.fx * SPOT_RAD * share**-0.5, 0.6)
         streak = np.full(len(which), self.settings.camera.streak_px * camera.width / 612.0)
         seen = self._seen if self._distortion(camera) is None else np.empty((0, 0), np.int32)
-        add_spots(image, pixels, amplitude, sigma, streak, spots.part[which], seen, self.mesh.part)
+        whole = np.round(shift).astype(np.int64)
+        add_spots(image, pixels, amplitude, sigma, streak, spots.part[which], seen, self.mesh.part, whole)
 
     def sensor(self, camera: Camera) -> Sensor:
         """The sensor of a camera of this size."""
@@ -296,7 +300,7 @@ def draw(
         if both:
             on = moved(off, shift)
             if spots is not None:
-                renderer.add_laser(on, spots, camera, place)
+                renderer.add_laser(on, spots, camera, place, shift)
             on = sensor.exposed(on, 4 * frame + 2 + eye)
         images += [sensor.exposed(off, 4 * frame + eye), on]
     return StereoFrames(stamp_s, images[0], images[2], images[1], images[3])

@@ -1,8 +1,11 @@
 """When the rehearsed faults are on."""
 
+from pathlib import Path
+
 import pytest
 from pydantic import ValidationError
 
+from devices.world import settings
 from devices.world.faults import FaultSchedule
 from devices.world.settings import Faults, WorldSettings
 
@@ -62,3 +65,8 @@ def test_every_setting_of_the_world_is_documented():
         assert section.get("description"), name
         missing += undocumented(section, name)
     assert [path for path in missing if path != "world.seed"] == []
+
+
+def test_every_fault_is_in_the_table_that_users_read():
+    table = (Path(settings.__file__).parent / "README.md").read_text("utf-8")
+    assert [name for name in Faults.model_fields if f"\n| `{name}` |" not in table] == []
