@@ -110,13 +110,14 @@ class KeepOut:
                 return self
             faded = old.trust - elapsed_s / DISTRUST_S
             return replace(self, surface=replace(old, trust=faded) if faded > 0 else None)
+        frame = self.turbine.blade_frame()
+        station, offset, depth = (float(v) for v in frame.to_blade(estimate.point))
+        along, across, inward = (float(v) for v in frame.rotation @ estimate.normal)
         edges = [side.offset_m for side in (estimate.leading, estimate.trailing) if side is not None]
-        at_axis = float(self.turbine.blade_frame().to_blade(estimate.point)[1])
-        front = min([0.0, *(estimate.across_slope * (offset - at_axis) for offset in edges)])
+        looked_at = float(np.clip(offset, min(edges, default=offset), max(edges, default=offset)))
+        front = min([0.0, *(-across / inward * (edge - looked_at) for edge in edges)])
         trust = min(1.0, (old.trust if old else 0.0) + elapsed_s / TRUST_S)
-        surface = BladeSurface(
-            estimate.station_m, estimate.depth_m + front, estimate.depth_slope, estimate.distance_sigma_m, trust
-        )
+        surface = BladeSurface(station, depth + front, -along / inward, estimate.distance_sigma_m, trust)
         return replace(self, surface=surface)
 
     def without_blade_surface(self) -> KeepOut:
@@ -136,12 +137,12 @@ class KeepOut:
         tower_axis = t.hub + t.overhang_m * x
         height = t.ground_z - t.hub[2]
         tower = ((0.0, 0.0), (0.0, t.tower_top_diameter_m / 2), (height, t.tower_base_diameter_m / 2), (height, 0.0))
-        nacelle = np.array([t.nacelle_length_m / 2, t.nacelle_width_m / 2, t.nacelle_width_m / 2])
+        nacelle = np.array([(hub_radius + t.nacelle_length_m) / 2, t.nacelle_width_m / 2, 0.6 * t.nacelle_width_m])
         return (
             Revolved(t.hub, t.rotor_rotation[:, 0], self._rotor_profile(), self.clearance_m),
             Ball(hub, hub_radius + grown_hub),
             Revolved(tower_axis, z, tower, grown),
-            Box(hub + t.nacelle_length_m / 2 * x, t.rotation, nacelle, grown_hub),
+            Box(hub + (hub_radius + t.nacelle_length_m) / 2 * x, t.rotation, nacelle, grown_hub),
         )
 
     def _rotor_profile(self) -> tuple[tuple[float, float], ...]:

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 Side = Literal["leading", "trailing"]
 Mode = Literal["both", "one", "wrong_side", "none"]
 
-STANDOFF_PID = Pid(p=1.6, i=0.15, d=0.3, limit=1.5, integral_limit=0.4)
+STANDOFF_PID = Pid(p=2.0, i=0.15, d=0.5, limit=1.5, integral_limit=0.4)
 
 
 @dataclass(frozen=True)
