@@ -18,6 +18,7 @@ EXPECTED = (
     ("mission.language.document", "MissionFileError", USAGE),
     ("mission.record.folder", "RunFolderError", USAGE),
     ("mission.executive.journal", "JournalError", USAGE),
+    ("mission.executive.resume", "ResumeError", USAGE),
     ("mission.executive.stage", "FlightError", REFUSED),
     ("flight.autopilot", "AutopilotError", REFUSED),
     ("devices.rig", "CaptureError", REFUSED),

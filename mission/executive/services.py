@@ -120,6 +120,8 @@ class Services:
         self.turbine = turbine
         self.memory.hub = (float(turbine.hub[0]), float(turbine.hub[1]), float(turbine.hub[2]))
         self.memory.heading, self.memory.azimuth = turbine.heading, turbine.azimuth
+        for name in ("hub_sigma_m", "heading_sigma", "azimuth_sigma"):
+            self.memory.values[name] = float(getattr(turbine, name))
         self.on_turbine_refined(turbine)
 
     async def ticks(self, rate_hz: float = 20.0) -> AsyncIterator[float]:
