@@ -72,8 +72,11 @@ def load_mission(path: Path, overrides: Sequence[str] = (), rig: str | None = No
     return examination.mission
 
 
-def examine(path: Path, overrides: Sequence[str] = (), rig: str | None = None) -> Examination:
-    """Read and check a mission file; never raises for what is in it."""
+def examine(path: Path, overrides: Sequence[str] = (), rig: str | None = None, checked: bool = True) -> Examination:
+    """Read and check a mission file; never raises for what is in it.
+
+    checked: without it the checks of the machine as a whole are left out: `mission prove` shows their counterexamples.
+    """
     sources = Sources(mission_root(path))
     problems = sources.problems
     mission: Mission | None = None
@@ -82,11 +85,11 @@ def examine(path: Path, overrides: Sequence[str] = (), rig: str | None = None) -
         resolved = _resolved(document, path, overrides, rig, sources)
         if resolved is not None:
             mission = _mission(resolved, path, problems)
-    if mission is not None and not _errors(problems):
+    if checked and mission is not None and not _errors(problems):
         from mission.language.checks import check
 
         problems.extend(check(mission))
-    findings = _silenced(problems, sources.allowed)
+    findings = _silenced(problems, sources.allowed, checked)
     if mission is not None:
         silenced = sorted({finding.code for finding in problems} - {finding.code for finding in findings})
         header = f"# allow in this file: {', '.join(silenced)}\n" if silenced else ""
@@ -269,7 +272,9 @@ def _errors(findings: Sequence[Diagnostic]) -> bool:
     return any(finding.level is Level.ERROR for finding in findings)
 
 
-def _silenced(problems: Sequence[Diagnostic], allowed: dict[str, dict[int, tuple[str, ...]]]) -> tuple[Diagnostic, ...]:
+def _silenced(
+    problems: Sequence[Diagnostic], allowed: dict[str, dict[int, tuple[str, ...]]], checked: bool
+) -> tuple[Diagnostic, ...]:
     """Findings without those that `# allow: CODE` permits, with those about useless permissions; sorted, each once."""
     kept: list[Diagnostic] = []
     used: set[tuple[str, int, str]] = set()
@@ -281,7 +286,7 @@ def _silenced(problems: Sequence[Diagnostic], allowed: dict[str, dict[int, tuple
             used.add((place.file, place.line, finding.code))
         else:
             kept.append(finding)
-    failed_early = _errors(kept)
+    checked = checked and not _errors(kept)
     for file, asked in allowed.items():
         for line, names in asked.items():
             for code in names:
@@ -291,6 +296,6 @@ def _silenced(problems: Sequence[Diagnostic], allowed: dict[str, dict[int, tuple
                     kept.append(Diagnostic(place, "M108", f"allow: there is no code {code!r}", hint))
                 elif not CODES[code].allowed:
                     kept.append(Diagnostic(place, "M108", f"allow: {code} cannot be silenced", CODES[code].text))
-                elif line and (file, line, code) not in used and not failed_early:
+                elif line and (file, line, code) not in used and checked:
                     kept.append(Diagnostic(place, "M108", f"allow: nothing on this line raises {code}", "remove it"))
     return tuple(sorted(kept, key=lambda finding: (finding.location, finding.level is Level.WARNING, finding.code)))

@@ -1,0 +1,37 @@
+"""Where a run went, from its journal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mission.language.diagram.parts import Painting, Visit
+from mission.language.document import Mission, enclosing
+
+
+def painting(mission: Mission, run: Path) -> Painting:
+    """Read a run's folder.
+
+    Raises:
+        JournalError: it has no readable journal.
+    """
+    from mission.executive.journal import read_journal
+
+    entries = read_journal(run / "journal.jsonl")
+    visits: dict[str, Visit] = {}
+    taken: dict[str, int] = {}
+    leaf, since = mission.leaf(mission.initial), 0.0
+    for entry in entries:
+        if entry.kind == "transition":
+            key = str(entry.fields["key"])
+            taken[key] = taken.get(key, 0) + 1
+            _visited(visits, leaf, entry.t - since)
+            leaf, since = str(entry.fields["to"]), entry.t
+    end = entries[-1].t if entries else 0.0
+    _visited(visits, leaf, end - since)
+    return Painting(run.resolve().name, visits, taken)
+
+
+def _visited(visits: dict[str, Visit], leaf: str, seconds: float) -> None:
+    for path in enclosing(leaf):
+        before = visits.get(path, Visit(0, 0.0))
+        visits[path] = Visit(before.times + 1, before.seconds + seconds)

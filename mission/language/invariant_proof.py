@@ -1,0 +1,83 @@
+"""Holds a mission to the statements that it makes about itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mission.language.cycles import components, cyclic, shortest_cycle
+from mission.language.document import enclosing
+from mission.language.endings import Endings, Failure
+from mission.language.exploration import Exploration, Situation, behaviour_of
+from mission.language.invariants import Invariant
+
+
+@dataclass(frozen=True)
+class InvariantProof:
+    """One invariant and the counterexample, None where it holds."""
+
+    invariant: Invariant
+    failure: Failure | None
+
+
+def invariant_proof(invariant: Invariant, exploration: Exploration, graph: Endings) -> InvariantProof:
+    """Look at every situation for a counterexample."""
+    truth = {
+        situation: invariant.statement.evaluate(flags(exploration, situation)) for situation in exploration.situations
+    }
+    if invariant.kind == "never":
+        for situation, true in truth.items():
+            if true:
+                message = f"{invariant.statement} becomes true in {situation.leaf!r}"
+                return InvariantProof(invariant, Failure("invariant", message, exploration.trace(situation)))
+        return InvariantProof(invariant, None)
+    failure = _avoidable(invariant, exploration, graph, lambda situation: truth[situation])
+    return InvariantProof(invariant, failure)
+
+
+def _avoidable(
+    invariant: Invariant, exploration: Exploration, graph: Endings, reached: Callable[[Situation], bool]
+) -> Failure | None:
+    """A way on which the statement never becomes true: it ends, stays, or goes round without it."""
+    away = [situation for situation in exploration.situations if not reached(situation)]
+    outside = set(away)
+    after = {
+        situation: [e.target for e in graph.edges[situation] if e.target in outside and e.transition.retries is None]
+        for situation in away
+    }
+    for situation in away:
+        if exploration.state(situation).final is not None:
+            message = f"the mission can end in {situation.leaf!r} without {invariant.statement}"
+            return Failure("invariant", message, exploration.trace(situation))
+        trouble = graph.troubles.get(situation)
+        if trouble is not None and trouble.kind == "deadlock" and f"{situation.leaf!r}" in trouble.message:
+            return Failure("invariant", trouble.message, exploration.trace(situation))
+    for component in components(away, after):
+        if cyclic(component, after) and not graph.deadline_around(component):
+            path = shortest_cycle(component[0], component, after)
+            message = f"{' → '.join(s.leaf for s in path)} can go on for ever without {invariant.statement}"
+            return Failure("invariant", message, exploration.trace(component[0]))
+    return None
+
+
+def flags(exploration: Exploration, situation: Situation) -> dict[str, float | bool | None]:
+    """What invariants may ask of a situation."""
+    state = exploration.state(situation)
+    behaviour = behaviour_of(state)
+    flying = exploration.flying(situation)
+    found: dict[str, float | bool | None] = {
+        "airborne": flying,
+        "armed": flying,
+        "laser_on": behaviour is not None and lights_laser(behaviour.name, behaviour.needs_vision),
+        "recording": bool(getattr(state.parameters, "record", False)),
+        "needs_vision": behaviour is not None and behaviour.needs_vision,
+        "ended": state.final is not None,
+    }
+    active = set(enclosing(situation.leaf))
+    return found | {f"in({path})": path in active for path in exploration.mission.states}
+
+
+def lights_laser(name: str, needs_vision: bool) -> bool:
+    """Whether a behaviour runs the close-up cycle with the laser: those that need images, but for the survey, which
+    looks from afar; and the one that waits for the blade to come back."""
+    return (needs_vision and name != "survey_turbine") or name == "reacquire_blade"
