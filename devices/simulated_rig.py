@@ -43,6 +43,7 @@ class SimulatedRig:
         self._laser_armed = True
         self._count = 0
         self._lock = threading.Lock()
+        self._rehearse()
 
     def capture(self, laser: bool = True) -> StereoFrames:
         """One set of frames; see `devices.rig.Rig.capture` and the fault switches of the world."""
@@ -55,6 +56,7 @@ class SimulatedRig:
                 raise CaptureError("no images: the simulated cameras deliver nothing (world.faults)")
             true = self._true_pose()
             stamp: float | None = getattr(true, "stamp_s", None)
+            now = (now + self._now()) / 2  # asking for the pose may take a while
             pose = camera_pose(true.position, true.attitude, true.gimbal, self.mount)
             frames = draw(
                 self.world.renderer,
@@ -71,6 +73,12 @@ class SimulatedRig:
             if faults.active("right_eye", now):
                 frames = replace(frames, right=None, right_laser=None)
             return frames
+
+    def _rehearse(self) -> None:
+        """Draw once and throw it away, so that nothing is compiled or built in flight."""
+        frame = self.world.shape.blade_frame()
+        position = frame.to_ned(np.array([self.world.shape.blade.tip_radius_m / 2, 0.0, -4.0]))
+        draw(self.world.renderer, self.geometry, CameraPose(position, self.world.shape.rotation), shift=(1.5, 1.5))
 
     def _shift(self, true: Carrier, pose: CameraPose) -> tuple[float, float]:
         """Pixels that the scene in the middle of the image moves by between the laser-off and the laser-on exposure."""
