@@ -36,12 +36,12 @@ def report(
         print(line)
 
 
-def rebuild(folder: RunFolder, wall_s: float | None = None) -> Mapping[str, Any]:
+def rebuild(folder: RunFolder) -> Mapping[str, Any]:
     """Compute the summary, write it and the page, and return it."""
     from mission.record.report import write_report
     from mission.record.summary import write_summary
 
-    summary = write_summary(folder, wall_s)
+    summary = write_summary(folder)
     write_report(folder, summary)
     return summary
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -80,7 +79,6 @@ def run(
     from mission.record.folder import create
 
     folder = create(record, mission.name, mission.resolved_yaml)
-    started = time.monotonic()
     result, view = _fly(
         mission,
         folder,
@@ -95,7 +93,7 @@ def run(
         },
     )
     view.close()
-    _close(folder, result, time.monotonic() - started)
+    _close(folder, result)
     raise typer.Exit(INTERRUPTED if result.interrupted else OUTCOME_CODES.get(result.outcome, ABORTED))
 
 
@@ -193,13 +191,22 @@ def _crashed(folder: RunFolder, error: Exception) -> str:
     return f"unexpected error, please report it: {type(error).__name__}: {one_line(error)}; details in {path}"
 
 
-def _close(folder: RunFolder, result: FlightResult, wall_s: float) -> None:
-    """Compute and print what the run came to."""
+def _close(folder: RunFolder, result: FlightResult) -> None:
+    """Compute and print what the run came to. How it ended is the exit code, whatever becomes of the report."""
+    from mission.cli.errors import one_line
     from mission.cli.report import rebuild, told
+    from mission.record.folder import log_line
 
     if not folder.journal.exists():
         _discard_if_empty(folder)
         raise CommandError("nothing was flown: the vehicle is not armed without a yes", REFUSED)
-    summary = rebuild(folder, wall_s=wall_s)
-    for line in told(folder, summary):
+    try:
+        log_line(folder, "run_ended", outcome=result.outcome, interrupted=result.interrupted)
+        lines = told(folder, rebuild(folder))
+    except Exception as error:
+        again = f"`mission report {folder.path}` tries again"
+        print(f"{result.outcome} in {result.final_state}", flush=True)
+        print(f"mission: no report: {type(error).__name__}: {one_line(error)}; {again}", file=sys.stderr)
+        return
+    for line in lines:
         print(line)

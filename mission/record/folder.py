@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import shutil
@@ -94,6 +95,7 @@ def create(logs: Path, mission: str, resolved_yaml: str, needed_mb: int = NEEDED
             file.write(resolved_yaml)
             file.flush()
             os.fsync(file.fileno())
+        log_line(folder, "run_created")
     except (OSError, RunFolderError) as error:
         if path is not None:
             shutil.rmtree(path, ignore_errors=True)
@@ -105,6 +107,13 @@ def create(logs: Path, mission: str, resolved_yaml: str, needed_mb: int = NEEDED
             f"{error.filename or logs}: cannot write the record, {_reason(error)}: choose another with --record DIR"
         ) from error
     return folder
+
+
+def log_line(folder: RunFolder, event: str, **fields: object) -> None:
+    """Append a line to the run log while nobody else writes there: before the flight, and after it."""
+    stamp = datetime.now(UTC).isoformat().replace("+00:00", "Z")
+    with folder.log.open("a", encoding="utf-8") as file:
+        file.write(json.dumps({**fields, "event": event, "level": "info", "timestamp": stamp}) + "\n")
 
 
 def open_run(run: Path, logs: Path = Path("logs")) -> RunFolder:

@@ -117,7 +117,7 @@ class RunHistory:
 
     @property
     def wall_s(self) -> float | None:
-        """Wall seconds from the first line of the run log to the last."""
+        """Wall seconds from the first line of the run log, written with the folder, to the last."""
         stamps = [line["timestamp"] for line in self.log if "timestamp" in line]
         if len(stamps) < 2:
             return None

@@ -16,6 +16,7 @@ from mission.record.coverage import SHARP
 from mission.record.folder import RunFolder
 from mission.record.history import RunHistory
 from mission.record.plots import Series, Span, blade_map, over_time, timeline
+from mission.record.track import views
 
 THUMBS = 12
 """Photographs shown of each side; the page links to the files."""
@@ -33,6 +34,7 @@ def write_report(folder: RunFolder, summary: Mapping[str, Any]) -> Path:
         when=_when(summary["run"]),
         duration=f"{int(summary['duration_s']) // 60}:{int(summary['duration_s']) % 60:02d} min",
         cards=_cards(summary),
+        views=[Markup(view) for view in views(history)],
         timeline=Markup(timeline(_spans(summary))),
         standoff=Markup(_standoff(history, summary)),
         sides=[_side(folder, history, summary, side) for side in summary["coverage"]],

@@ -17,19 +17,18 @@ UNWATCHED_S = 5.0
 """A silence of vision longer than this means that nobody watched: while somebody does, missing images are lines too."""
 
 
-def write_summary(folder: RunFolder, wall_s: float | None = None) -> Mapping[str, Any]:
+def write_summary(folder: RunFolder) -> Mapping[str, Any]:
     """Compute the summary and replace summary.json by it in one step."""
-    summary = summarise(RunHistory(folder), wall_s)
+    summary = summarise(RunHistory(folder))
     draft = folder.summary.with_suffix(".part")
     draft.write_text(json.dumps(summary, indent=1, ensure_ascii=False) + "\n", "utf-8")
     draft.replace(folder.summary)
     return summary
 
 
-def summarise(history: RunHistory, wall_s: float | None = None) -> Mapping[str, Any]:
-    """The summary of a run, finished or not. `wall_s` where the caller measured it; otherwise the run log tells."""
-    wall_s = wall_s if wall_s is not None else history.wall_s
-    duration_s = history.duration_s
+def summarise(history: RunHistory) -> Mapping[str, Any]:
+    """The summary of a run, finished or not."""
+    duration_s, wall_s = history.duration_s, history.wall_s
     end = history.end or {}
     last = history.visits[-1].state if history.visits else None
     summary: dict[str, Any] = {

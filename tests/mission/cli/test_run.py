@@ -126,6 +126,23 @@ def test_ctrl_c_before_anything_flew_is_exit_code_130_and_leaves_no_folder(
     assert list((tmp_path / "logs").iterdir()) == []
 
 
+def test_a_completed_flight_stays_completed_when_its_report_cannot_be_written(
+    call: Call, flights: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mission.record import summary
+
+    def full(folder: RunFolder) -> None:
+        raise OSError(28, "No space left on device")
+
+    flights(ends("completed"))
+    monkeypatch.setattr(summary, "write_summary", full)
+    said = call("run", BLADE, "--record", tmp_path)
+    said.assert_one_line(0)
+    assert "No space left" in said.err
+    assert "mission report" in said.err
+    assert "completed in completed" in said.out
+
+
 def test_a_crash_is_one_line_with_its_traceback_in_the_run_s_folder(call: Call, flights: Any, tmp_path: Path) -> None:
     def fly(options: FlightOptions) -> FlightResult:
         write_journal(options.folder, until_s=60.0)

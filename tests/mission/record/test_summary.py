@@ -36,9 +36,9 @@ def test_it_has_every_figure_that_its_readers_rely_on(run: RunFolder) -> None:
 
 
 def test_a_completed_flight_in_numbers(run: RunFolder) -> None:
-    summary = summarise(RunHistory(run), wall_s=50.0)
+    summary = summarise(RunHistory(run))
     assert (summary["outcome"], summary["final_state"]) == ("completed", "completed")
-    assert (summary["duration_s"], summary["speed_factor"]) == (200.0, 4.0)
+    assert summary["duration_s"] == 200.0
     assert summary["standoff"] == {"target_m": 3.0, "rmse_m": 0.1, "min_m": 3.1, "max_m": 3.1}
     assert summary["tip"] == {"found": True, "radius_m": 39.8}
     assert summary["root"] == {"found": True, "radius_m": 1.2}
@@ -62,6 +62,20 @@ def test_a_stretch_that_was_never_seen_is_missing_from_the_coverage(tmp_path: Pa
     assert summary["coverage"]["leading"] == pytest.approx(1 - (10 - 2 * 1.29) / 39, abs=0.02)
     assert summary["vision"]["bridged"] > 100
     assert summary["vision"]["longest_gap_s"] == pytest.approx(10 / 39 * 50, abs=0.5)
+
+
+def test_wall_time_runs_from_the_folder_s_making_to_the_last_line_of_the_log(tmp_path: Path) -> None:
+    folder = create(tmp_path, "a", MISSION)
+    lines = [
+        {"event": "run_created", "timestamp": "2026-11-21T10:00:00Z"},
+        {"event": "transition", "timestamp": "2026-11-21T10:00:09.5Z"},
+        {"event": "run_ended", "timestamp": "2026-11-21T10:00:50Z"},
+    ]
+    assert json.loads(folder.log.read_text())["event"] == "run_created"
+    folder.log.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    write_journal(folder)
+    summary = summarise(RunHistory(folder))
+    assert (summary["wall_s"], summary["speed_factor"]) == (50.0, 4.0)
 
 
 def test_a_stream_that_was_stopped_on_purpose_has_no_gap(tmp_path: Path) -> None:
