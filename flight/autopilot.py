@@ -1,5 +1,5 @@
-"""The autopilot as this project sees it: what it reports and what it can be told. PX4 over MAVSDK, or the simulated vehicle
-in process for lockstep time, stand behind one Protocol."""
+"""The autopilot as this project sees it: what it reports and what it can be told. PX4 over MAVSDK, or the simulated
+vehicle in process for lockstep time, stand behind one Protocol."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class AutopilotError(RuntimeError):
 
 @dataclass(frozen=True)
 class VehiclePose:
-    """Position (3,) m and velocity (3,) m/s in local NED, attitude (3,) = roll, pitch, yaw in radians, gimbal (2,) = yaw,
-    pitch in radians, yaw measured from north and pitch from the horizon (a stabilised gimbal holds both). stamp_s on the
-    executive's clock."""
+    """Position (3,) m and velocity (3,) m/s in local NED, attitude (3,) = roll, pitch, yaw in radians, gimbal (2,) =
+    yaw, pitch in radians, yaw measured from north and pitch from the horizon (a stabilised gimbal holds both). stamp_s
+    on the executive's clock."""
 
     stamp_s: float
     position: Array

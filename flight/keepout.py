@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.solids import Ball, Box, Revolved, Solid
+from flight.solids import Ball, Box, Point, Revolved, Solid
 from flight.turbine import Turbine
 from vision.estimate import BladeEstimate
 
@@ -54,7 +55,7 @@ class KeepOut:
 
     def distance(self, point: Array) -> float:
         """Metres from a point (3,) of local NED to the volume; negative inside."""
-        return self._probe(np.asarray(point, float))[0]
+        return self._distance(_floats(point))
 
     def inside(self, point: Array) -> bool:
         """Whether a point (3,) of local NED lies in the volume."""
@@ -199,18 +200,24 @@ class KeepOut:
         t = self.turbine
         return self.sigmas * float(np.hypot(t.hub_sigma_m, t.heading_sigma * station))
 
-    def _probe(self, point: Array) -> tuple[float, Array]:
-        return min((solid.probe(point) for solid in self._solids), key=lambda probed: probed[0])
+    def _distance(self, point: Point) -> float:
+        return min([solid.distance(point) for solid in self._solids])
+
+    def _normal(self, point: Array) -> Array:
+        """The unit direction (3,) of the steepest growth of the distance."""
+        at = _floats(point)
+        return min(self._solids, key=lambda solid: solid.distance(at)).normal(at)
 
     def _way(self, start: Array, end: Array, least: float) -> float | None:
         """The share of the way at which the distance falls below `least`, or None. Steps are as long as the distance
         allows; the shortest, 5 cm, cannot cut a corner that is rounded by the clearance by more than a fraction of a
         millimetre."""
-        length = float(np.linalg.norm(end - start))
+        (x, y, z), (u, v, w) = _floats(start), _floats(end - start)
+        length = hypot(u, v, w)
         along = 0.0
         while along <= length:
             share = along / length if length else 1.0
-            distance = self.distance(start + share * (end - start)) - least
+            distance = self._distance((x + share * u, y + share * v, z + share * w)) - least
             if distance < -1e-6:
                 return share
             along += max(distance, 0.05)
@@ -219,10 +226,10 @@ class KeepOut:
     def _pushed(self, point: Array) -> Array:
         """The nearest allowed point: along the steepest growth of the distance, again where solids meet."""
         for _ in range(30):
-            distance, direction = self._probe(point)
+            distance = self.distance(point)
             if distance >= 0:
                 return point
-            point = point + (MARGIN_M - distance) * direction
+            point = point + (MARGIN_M - distance) * self._normal(point)
         return point
 
     def _to_the_front(self, point: Array) -> Array:
@@ -243,8 +250,8 @@ class KeepOut:
             if share is None:
                 break
             met = current + share * (position - current)
-            distance, direction = self._probe(met)
-            met = met + (MARGIN_M - distance) * direction
+            direction = self._normal(met)
+            met = met + (MARGIN_M - self.distance(met)) * direction
             position = position + max(0.0, float((met - position) @ direction)) * direction
         return position
 
@@ -260,3 +267,8 @@ class KeepOut:
                 return point
             share -= 0.05 / length
         return current
+
+
+def _floats(point: Array) -> Point:
+    x, y, z = np.asarray(point, float).tolist()
+    return x, y, z

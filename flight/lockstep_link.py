@@ -38,7 +38,6 @@ class LockstepAutopilot:
     def __init__(self, vehicle: SimulatedVehicle, truth_log: TruthLog | None = None, start_s: float = 0.0) -> None:
         self.vehicle = vehicle
         self.up = True
-        self.before_step: Callable[[float], None] = lambda now_s: None
         self._log = truth_log
         self._start_s = start_s
         self._elapsed_s = 0.0
@@ -55,7 +54,6 @@ class LockstepAutopilot:
         """Move the vehicle on, sampling telemetry on the way."""
         self._elapsed_s += seconds
         while self.vehicle.time_s + POSE_PERIOD_S <= self._elapsed_s + 1e-9:
-            self.before_step(self._start_s + self.vehicle.time_s)
             self.vehicle.step(POSE_PERIOD_S)
             if self._log is not None:
                 self._log.update()

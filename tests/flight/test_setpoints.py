@@ -43,6 +43,9 @@ def run(story) -> None:
     loop = LockstepLoop()
     try:
         loop.run_until_complete(story())
+        for task in asyncio.all_tasks(loop):
+            task.cancel()
+        loop.run_until_complete(asyncio.sleep(0))
     finally:
         loop.close()
 
