@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +25,8 @@ _EARTH_YAW = mavlink.GIMBAL_MANAGER_FLAGS_YAW_LOCK | mavlink.GIMBAL_MANAGER_FLAG
 
 @dataclass(frozen=True)
 class Command:
-    """A command as received: seven numbers (latitude and longitude in degrees), and whom it came from and was meant for.
+    """A command as received: seven numbers (latitude and longitude in degrees), and whom it came from and was meant
+    for.
 
     above_home: the height in the seventh is above home, else above mean sea level.
     """
@@ -83,7 +85,11 @@ class CommandHandler:
         handler = self._handlers.get(command.number)
         if command.number == mavlink.MAV_CMD_DO_SET_MODE:
             self._acknowledge(command, Result.ACCEPTED)
-        self._acknowledge(command, handler(command) if handler is not None else Result.UNSUPPORTED)
+        try:
+            result = handler(command) if handler is not None else Result.UNSUPPORTED
+        except (ValueError, OverflowError, struct.error):
+            result = Result.DENIED  # not a number where a whole one is needed
+        self._acknowledge(command, result)
 
     def set_mode_message(self, message: Any) -> None:
         """The old SET_MODE message: no answer but the mode itself."""

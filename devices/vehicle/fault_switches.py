@@ -33,8 +33,8 @@ class FaultSwitches:
             raise ValueError("no such switch")
         try:
             switch(**arguments)
-        except (TypeError, KeyError) as error:
-            raise ValueError(str(error)) from None
+        except (TypeError, KeyError, ValueError) as error:
+            raise ValueError(" ".join(str(error).split())) from None
 
     def gps_jump(self, north_m: float, east_m: float, down_m: float = 0.0) -> None:
         """The estimated position jumps."""

@@ -3,13 +3,14 @@ nowhere else, whether they came over MAVLink or in process."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
 
 from devices.vehicle.battery import Battery
 from devices.vehicle.body import Body
-from devices.vehicle.control import Controller, Target
+from devices.vehicle.control import NAN, Controller, Target
 from devices.vehicle.estimator import VALID_AFTER_S, Estimator
 from devices.vehicle.gimbal import Gimbal
 from devices.vehicle.modes import Flight, Flying, Hold, Land, Mode, Offboard, Piloted, ReturnHome, Sticks, TakeOff
@@ -134,12 +135,19 @@ class Firmware:
         result = self.set_mode(Mode.HOLD)
         if result is Result.ACCEPTED and isinstance(self._flying, Hold):
             hold = self._flying
-            hold.n, hold.e = (north_m if north_m == north_m else hold.n), (east_m if east_m == east_m else hold.e)
-            hold.d, hold.yaw = (down_m if down_m == down_m else hold.d), yaw
+            hold.n, hold.e = (
+                (north_m if math.isfinite(north_m) else hold.n),
+                (east_m if math.isfinite(east_m) else hold.e),
+            )
+            hold.d, hold.yaw = (down_m if math.isfinite(down_m) else hold.d), (yaw if math.isfinite(yaw) else NAN)
         return result
 
     def offboard_setpoint(self, setpoint: Target) -> None:
         """A setpoint from the companion computer, now."""
+        place = (setpoint.n, setpoint.e, setpoint.d, setpoint.yaw)
+        setpoint.n, setpoint.e, setpoint.d, setpoint.yaw = (n if math.isfinite(n) else NAN for n in place)
+        speed = (setpoint.vn, setpoint.ve, setpoint.vd, setpoint.yaw_rate)
+        setpoint.vn, setpoint.ve, setpoint.vd, setpoint.yaw_rate = (n if math.isfinite(n) else 0.0 for n in speed)
         limits = self.parameters
         setpoint.speed_max = float(limits["MPC_XY_VEL_MAX"])
         setpoint.climb_max = float(limits["MPC_Z_VEL_MAX_UP"])

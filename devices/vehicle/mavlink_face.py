@@ -76,10 +76,7 @@ class MavlinkFace:
             return
         mask = message.type_mask
         place = [NAN if mask & 1 << axis else value for axis, value in enumerate((message.x, message.y, message.z))]
-        speed = [
-            0.0 if mask & 8 << axis or not math.isfinite(value) else value
-            for axis, value in enumerate((message.vx, message.vy, message.vz))
-        ]
+        speed = [0.0 if mask & 8 << axis else value for axis, value in enumerate((message.vx, message.vy, message.vz))]
         if message.coordinate_frame in _BODY_FRAMES:
             yaw = self._vehicle.estimate.yaw
             cy, sy = math.cos(yaw), math.sin(yaw)

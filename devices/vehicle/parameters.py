@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 _SCALED_WITH_TIME = ("COM_OF_LOSS_T", "COM_DL_LOSS_T", "COM_RC_LOSS_T")
@@ -89,8 +90,8 @@ class ParameterTable:
         return len(self._values)
 
     def set(self, name: str, value: float) -> bool:
-        """Change a value; False where there is no such parameter."""
-        if name not in self._values:
+        """Change a value; False where there is no such parameter, or the value is no number."""
+        if name not in self._values or not math.isfinite(value):
             return False
         self._values[name] = round(value) if isinstance(self._values[name], int) else float(value)
         return True

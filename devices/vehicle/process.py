@@ -22,14 +22,14 @@ from devices.vehicle.vehicle import ForwardRange, SimulatedVehicle, TruePose, Ve
 
 _WAKE_S = 0.005
 _CHUNK_S = 0.004
-_LAG_MAX_S = 0.2
+_LAG_MAX_S = 0.4
 _PARENT_CHECK_S = 0.5
 
 
 class VehicleServer:
     """Runs a vehicle until stopped.
 
-    Simulated time is wall time times the speed. When the machine takes the processor away, up to 0.2 s of wall time are
+    Simulated time is wall time times the speed. When the machine takes the processor away, up to 0.4 s of wall time are
     caught up, in small chunks between which the sockets are read; what is beyond that is left out, so that setpoints
     which waited in a socket are not mistaken for a stream that stopped.
 
@@ -46,10 +46,11 @@ class VehicleServer:
         self.faces = [MavlinkFace(UdpLink(link), self.vehicle, self._on_setpoint) for link in settings.links]
         self._truth = bind_udp("127.0.0.1", settings.truth_port)
         self._switches = FaultSwitches(self.vehicle, [face.link for face in self.faces])
-        self._answered: dict[tuple[str, int], tuple[int, dict[str, Any]]] = {}
+        self._answered: dict[tuple[str, int], dict[str, Any]] = {}
         self._asking: tuple[str, int] = ("", 0)
         self._log = TruthLog(settings.folder, self.vehicle, wall=True) if settings.folder is not None else None
         self._origin_s = time.monotonic()
+        self._left_out_s = 0.0
         self._stopping: str | None = None
         self._parent = os.getppid()
         self._parent_checked_s = self._origin_s
@@ -85,7 +86,13 @@ class VehicleServer:
         """Write the last event and close everything; idempotent."""
         if self._log is not None:
             with contextlib.suppress(ValueError):
-                self._log.event(VehicleEvent(self.vehicle.time_s, "stopped", {"reason": self._stopping or "error"}))
+                self._log.event(
+                    VehicleEvent(
+                        self.vehicle.time_s,
+                        "stopped",
+                        {"reason": self._stopping or "error", "left_out_s": round(self._left_out_s, 3)},
+                    )
+                )
             self._log.close()
             self._log = None
         self._truth.close()
@@ -104,6 +111,7 @@ class VehicleServer:
         behind_s = time.monotonic() - self._origin_s - self.vehicle.time_s / speed
         if behind_s > _LAG_MAX_S:
             self._origin_s += behind_s - _LAG_MAX_S
+            self._left_out_s += behind_s - _LAG_MAX_S
         chunks = 0
         while (time.monotonic() - self._origin_s) * speed - self.vehicle.time_s >= _CHUNK_S:
             self.vehicle.step(_CHUNK_S)
@@ -142,11 +150,10 @@ class VehicleServer:
         return self.vehicle.pose()
 
     def _throw_switch(self, request: dict[str, Any]) -> dict[str, Any]:
-        ticket = int(request.pop("ticket", 0))
-        name = str(request.pop("command", ""))
+        ticket, name = request.pop("ticket", 0), str(request.pop("command", ""))
         before = self._answered.get(self._asking)
-        if before is not None and before[0] == ticket:
-            return before[1]
+        if before is not None and before["ticket"] == ticket:
+            return before
         reply: dict[str, Any] = {"ticket": ticket, "time_s": self.vehicle.time_s}
         try:
             if name == "stop":
@@ -155,7 +162,7 @@ class VehicleServer:
                 self._switches.run(name, request)
         except ValueError as error:
             reply["error"] = str(error)
-        self._answered[self._asking] = (ticket, reply)
+        self._answered[self._asking] = reply
         return reply
 
     def _watch_parent(self) -> None:

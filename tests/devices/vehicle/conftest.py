@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -78,6 +79,15 @@ class Client:
 
     def send(self, message: Any) -> None:
         self._socket.sendto(message.pack(self._mav), ("127.0.0.1", self.link.port))
+        self.face.receive()
+        self._read()
+
+    def send_raw(self, message_id: int, crc_extra: int, payload: bytes) -> None:
+        """Send a payload under a valid MAVLink 2 header and checksum."""
+        head = struct.pack("<BBBBBB", len(payload), 0, 0, 0, 1, 195) + message_id.to_bytes(3, "little")
+        check = mavlink.x25crc(head + payload)
+        check.accumulate(bytes([crc_extra]))
+        self._socket.sendto(b"\xfd" + head + payload + struct.pack("<H", check.crc), ("127.0.0.1", self.link.port))
         self.face.receive()
         self._read()
 

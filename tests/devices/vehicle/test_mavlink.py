@@ -4,6 +4,7 @@ import math
 import struct
 from collections import Counter
 
+import numpy as np
 import pytest
 from pymavlink.dialects.v20 import development as mavlink
 
@@ -232,6 +233,44 @@ def test_rubbish_and_strangers_messages_do_no_harm(pilot, client):
     c.send(mavlink.MAVLink_command_long_message(77, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0))
     assert not p.firmware.armed
     assert c.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1) == [ACCEPTED]
+
+
+def test_no_message_however_absurd_breaks_it(pilot, client):
+    p = pilot().airborne()
+    c = client(p)
+    rng = np.random.default_rng(5)
+    odd = struct.pack("<fffii", math.nan, math.inf, -1e38, -1, 0x7FFFFFFF)
+    for name in HANDLED:
+        kind = mavlink.mavlink_map[getattr(mavlink, f"MAVLINK_MSG_ID_{name}")]
+        for _ in range(60):
+            payload = bytearray(rng.bytes(kind.unpacker.size))
+            for at in range(0, len(payload) - 4, 4):
+                if rng.random() < 0.4:
+                    start = 4 * int(rng.integers(5))
+                    payload[at : at + 4] = odd[start : start + 4]
+            c.send_raw(kind.id, kind.crc_extra, aimed(kind, payload))
+            c.run(0.02)
+    for command in range(0, 2600):
+        c.command(command, *rng.choice([math.nan, math.inf, 0.0, 1.0, 6.0, 1e30], 7))
+    c.run(1)
+    assert np.isfinite([*p.vehicle.pose().position, *p.vehicle.pose().attitude]).all()
+
+
+HANDLED = (
+    *("HEARTBEAT", "COMMAND_LONG", "COMMAND_INT", "SET_MODE", "PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"),
+    *("SET_POSITION_TARGET_LOCAL_NED", "TIMESYNC", "PING", "MISSION_REQUEST_LIST", "MISSION_COUNT"),
+    *("MISSION_CLEAR_ALL", "MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"),
+    *("GIMBAL_MANAGER_SET_ATTITUDE", "GIMBAL_MANAGER_SET_PITCHYAW"),
+)
+
+
+def aimed(kind, payload):
+    """The payload with the vehicle as its target, where the message has one."""
+    values = list(kind.unpacker.unpack(bytes(payload)))
+    for index, field in enumerate(kind.ordered_fieldnames):
+        if field in ("target", "target_system", "target_component") and index < len(values):
+            values[index] = 1
+    return kind.unpacker.pack(*values)
 
 
 def test_wind_and_range_are_reported(pilot, client):
