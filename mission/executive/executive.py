@@ -21,6 +21,7 @@ from mission.executive.gate import Gate, guard_services
 from mission.executive.journal import FORMAT, Journal
 from mission.executive.machine import Machine, entries
 from mission.executive.queue import EventQueue, Queued
+from mission.executive.resume import take_up
 from mission.executive.snapshot import Snapshot
 from mission.executive.status import Recent, Status, possible
 from mission.executive.timing import Timing, Waiting
@@ -137,7 +138,12 @@ class Executive:
             )
             now = self._clock.now()
             self._timing = self._timing.entering(self.mission, tuple(reversed(self._machine.configuration.active)), now)
-            await self._begin()
+            try:
+                if self._resumed:
+                    await self._patiently(take_up(self.services, self.mission, self._machine.configuration))
+                await self._begin()
+            except Exception as error:
+                await self._fault(error)
             while self._ended is None:
                 await self._turn()
             await self._finish()
@@ -258,7 +264,7 @@ class Executive:
     async def _act_on_time(self) -> None:
         """Deadlines cancel the work that they time; transitions whose delay is over are taken if they still can be."""
         now = self._clock.now()
-        if now - self._kept_s >= KEEP_S:
+        if now - self._kept_s >= KEEP_S and not len(self._queue):
             self._kept_s = now
             self._journal_memory(now)
         late = self._timing.overdue(now)
@@ -314,8 +320,8 @@ class Executive:
             **{"from": step.source, "to": step.after.leaf},
             history=step.after.history,
             taken=step.after.taken,
+            **({} if (memory := self._news()) is None else {"memory": memory}),
         )
-        self._journal_memory(now)
         await self._patiently(self._journal.durable())
         await self._machine.take(queued.name, quantities, queued.origin, transition)
         now = self._clock.now()
@@ -456,7 +462,8 @@ class Executive:
             if condition is not None
             for name in condition.names
         }
-        about = {"origin": queued.origin, "only": queued.only.key if queued.only else None}
+        only = queued.only.key if queued.only else None
+        about = {"origin": queued.origin, "only": only, "confirmed": queued.confirmed or None}
         self._journal.append(
             "event",
             self._clock.now(),
@@ -469,14 +476,21 @@ class Executive:
         )
 
     def _journal_memory(self, now: float) -> None:
-        memory = asdict(self.services.memory)
-        if memory != self._remembered:
-            self._remembered = memory
+        memory = self._news()
+        if memory is not None:
             self._journal.append("memory", now, **memory)
         station = self.services.progress.station_m
         if station is not None and round(station, 1) != self._station_m:
             self._station_m = round(station, 1)
             self._journal.append("progress", now, state=self._machine.state, station_m=self._station_m)
+
+    def _news(self) -> dict[str, Any] | None:
+        """What the journal has not been told yet of what was found out."""
+        memory = asdict(self.services.memory)
+        if memory == self._remembered:
+            return None
+        self._remembered = memory
+        return memory
 
     def _snapshot(self, was_ours: bool = True) -> Snapshot:
         state = self.mission.states[self._machine.state]

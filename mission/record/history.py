@@ -97,8 +97,7 @@ class RunHistory:
         """What the behaviours had found out, as last journalled."""
         found: dict[str, Any] = {}
         for line in self.journal:
-            if line["kind"] == "memory":
-                found.update(line)
+            found.update(line if line["kind"] == "memory" else line.get("memory", {}))
         return found
 
     @property

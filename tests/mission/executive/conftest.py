@@ -15,6 +15,7 @@ from flight.autopilot import Setpoint, Telemetry, VehiclePose
 from mission.behaviours import behaviour as registry
 from mission.behaviours.behaviour import Behaviour, NoParameters
 from mission.executive import executive as module
+from mission.executive import resume
 from mission.executive.clock import Clock, LockstepClock, LockstepLoop, WallClock
 from mission.executive.executive import Executive, Outcome
 from mission.executive.journal import Journal, read_journal
@@ -55,6 +56,9 @@ class MemoryAutopilot:
 
     async def land(self) -> None:
         self.commands.append("land")
+
+    async def take_gimbal(self) -> None:
+        self.commands.append("take_gimbal")
 
     async def start_offboard(self, first: Setpoint) -> None:
         self.commands.append("start_offboard")
@@ -243,7 +247,7 @@ OUTCOMES = ("done", "found", "failed")
 def fly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Flight]:
     """`fly(states, {"behaviour": coroutine}, …)` prepares a flight; `.run()` flies it."""
     known: dict[str, Behaviour] = {}
-    for place in (registry, module):
+    for place in (registry, module, resume):
         monkeypatch.setattr(place, "behaviours", lambda: known)
 
     def prepare(

@@ -364,11 +364,14 @@ def test_what_was_found_out_is_in_the_journal_before_the_state_is_left(fly: Any)
         for station in range(10):
             services.progress.station_m = float(station)
             await services.clock.sleep(1.0)
+        services.memory.passes_done.append("leading")
         return "done"
 
     flight = fly({"fly": {"do": "finding", "on": {"done": "completed"}}, **END}, {"finding": finding})
     flight.run()
     kinds = [kind for kind, _ in flight.journal]
     assert kinds.index("memory") < kinds.index("transition")
+    left = next(fields for kind, fields in flight.journal if kind == "transition")
+    assert left["memory"]["passes_done"] == ["leading"]
     stations = [fields["station_m"] for kind, fields in flight.journal if kind == "progress"]
     assert stations == sorted(stations) and len(stations) >= 4

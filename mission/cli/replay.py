@@ -1,0 +1,83 @@
+"""The run again from its record: the same events through the same machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def replay(
+    run: Annotated[Path, typer.Argument(help="The run's folder, name, or `latest`.")],
+    speed: Annotated[
+        float | None, typer.Option(min=0.01, help="Mission seconds per wall second; without it, as fast as it goes.")
+    ] = None,
+    begin: Annotated[float, typer.Option("--from", metavar="SECONDS", help="Show nothing before this time.")] = 0.0,
+    step: Annotated[bool, typer.Option("--step", help="Wait for the Enter key after every line.")] = False,
+    mission: Annotated[
+        Path | None, typer.Option(help="Play it through another mission file: does a change alter what happens?")
+    ] = None,
+    record: Annotated[Path, typer.Option(metavar="DIR", help="Where runs leave their folders.")] = Path("logs"),
+) -> None:
+    """Play the recorded events through the same machine and report the first difference, if there is any.
+
+    \b
+    Examples:
+      mission replay latest
+      mission replay 20261121T101500Z-v80_blade --speed 10 --from 60
+      mission replay latest --mission missions/v80_blade.yaml
+
+    Exit code 0 when everything happened as recorded, 1 at a difference.
+    """
+    import asyncio
+
+    from mission.cli.errors import ABORTED, USAGE, CommandError
+    from mission.executive.resume import ResumeError
+    from mission.language.document import load
+    from mission.record.folder import open_run
+
+    folder = open_run(run, record)
+    document = load(mission or folder.mission)
+    try:
+        difference, events, transitions = asyncio.run(_play(folder.journal, document, speed, begin, step))
+    except ResumeError as error:
+        raise CommandError(str(error), USAGE) from None
+    if difference is not None:
+        raise CommandError(difference, ABORTED)
+    print(f"{folder.name}: {events} events, {transitions} transitions, all as recorded")
+
+
+async def _play(
+    journal: Path, document: object, speed: float | None, begin: float, step: bool
+) -> tuple[str | None, int, int]:
+    import asyncio
+
+    from mission.executive.replay import replay
+
+    events = transitions = 0
+    before = begin
+    async for played in replay(journal, document):  # type: ignore[arg-type]
+        if played.difference is not None:
+            return f"{journal}:{played.line}: {played.event}: {played.difference}", events, transitions
+        if played.step is None and played.led_to == "transition":
+            continue
+        events += 1
+        transitions += played.step is not None
+        if played.t < begin:
+            continue
+        if speed is not None:
+            await asyncio.sleep(max(played.t - before, 0.0) / speed)
+            before = played.t
+        where = f"→ {played.state}" if played.step is not None else f"({played.led_to} in {played.state})"
+        print(f"{played.t:9.2f} s  {played.event:20} {where}", flush=True)
+        if step:
+            await asyncio.to_thread(_wait_for_enter)
+    return None, events, transitions
+
+
+def _wait_for_enter() -> None:
+    try:
+        input()
+    except EOFError:
+        raise KeyboardInterrupt from None

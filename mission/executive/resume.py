@@ -1,0 +1,164 @@
+"""Going on with a run that was cut off: what its journal says, and where that leaves mission and vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flight.autopilot import AutopilotError, Setpoint
+from mission.behaviours.behaviour import behaviours
+from mission.executive.journal import FORMAT, Entry, read_journal
+from mission.executive.monitors.pilot import STICKS
+from mission.executive.services import Memory
+from mission.language import semantics
+from mission.language.semantics import Configuration
+
+if TYPE_CHECKING:
+    from mission.executive.services import Services
+    from mission.language.document import Mission
+
+
+class ResumeError(RuntimeError):
+    """The run cannot be gone on with; the message is one line for a person."""
+
+
+@dataclass(frozen=True)
+class Interrupted:
+    """What a run left behind. configuration: its last settled state, with history and used-up retries. t: mission
+    seconds of its last line. station_m: how far along the blade it was last said to be."""
+
+    configuration: Configuration
+    memory: Memory
+    t: float
+    station_m: float | None = None
+
+
+def interrupted(journal: Path, mission: Mission) -> Interrupted:
+    """Read the journal of a run that was cut off, a torn last line included.
+
+    Raises:
+        ResumeError: it has come to its end, or belongs to another mission or version of this program.
+        JournalError: there is no journal, or it is damaged.
+    """
+    entries = read_journal(journal)
+    if not entries:
+        return Interrupted(semantics.start(mission), Memory(), 0.0)
+    check_format(journal, entries)
+    ended = next((entry for entry in entries if entry.kind == "end"), None)
+    if ended is not None:
+        outcome = ended.fields.get("outcome")
+        raise ResumeError(f"{journal.parent}: that run came to its end ({outcome}); there is nothing to go on with")
+    configuration, memory, station = semantics.start(mission), Memory(), None
+    for entry in entries:
+        if entry.kind in ("start", "transition"):
+            configuration = _configuration(entry)
+            station = None
+            if "memory" in entry.fields:
+                memory = remembered(entry.fields["memory"])
+        elif entry.kind == "memory":
+            memory = remembered(entry.fields)
+        elif entry.kind == "progress":
+            station = float(entry.fields["station_m"])
+    if configuration.leaf not in mission.states or mission.states[configuration.leaf].children:
+        raise ResumeError(
+            f"{journal.parent}: it was left in {configuration.leaf}, which {mission.path.name} does not have; "
+            "go on with the mission that was flown"
+        )
+    return Interrupted(configuration, memory, entries[-1].t, station)
+
+
+def where(mission: Mission, past: Interrupted, *, in_air: bool) -> Configuration:
+    """Where the machine goes on.
+
+    In the air: in the settled state. On the ground, in a state that flies: from the mission's beginning, history and
+    what was found out still known, unless the run was already on its way home; then it is over.
+    """
+    state = mission.states[past.configuration.leaf]
+    flies = behaviours()[state.do].airborne if state.do is not None else state.final is None
+    if in_air or not flies:
+        return past.configuration
+    if semantics.choose(mission, past.configuration, "abort", {}) is None:
+        finals = (path for path, other in mission.states.items() if other.final == "aborted")
+        return Configuration(next(finals, past.configuration.leaf), past.configuration.history)
+    return Configuration(semantics.start(mission).leaf, past.configuration.history)
+
+
+def restore(services: Services, past: Interrupted, *, in_air: bool) -> None:
+    """Remember what was found out. On the ground only what does not depend on where the autopilot's origin is: after a
+    change of battery that is another one."""
+    known = past.memory
+    if in_air:
+        services.memory = known
+        if known.hub is not None:
+            sigma = known.values
+            services.refine_turbine(
+                services.turbine.refined(
+                    hub=np.array(known.hub),
+                    heading=known.heading,
+                    azimuth=known.azimuth,
+                    hub_sigma_m=sigma.get("hub_sigma_m"),
+                    heading_sigma=sigma.get("heading_sigma"),
+                    azimuth_sigma=sigma.get("azimuth_sigma"),
+                )
+            )
+    else:
+        services.memory.passes_done = list(known.passes_done)
+        services.memory.tip_station_m, services.memory.root_station_m = known.tip_station_m, known.root_station_m
+
+
+async def take_up(services: Services, mission: Mission, configuration: Configuration) -> None:
+    """Before the settled state begins again in the air: hold here under our setpoints, and look for the blade.
+
+    A vehicle that a pilot flies meanwhile is left to him: the events say so.
+    """
+    telemetry = services.autopilot.telemetry
+    if not telemetry.in_air:
+        return
+    if telemetry.flight_mode in STICKS:
+        services.raise_event("pilot_took_over", mode=telemetry.flight_mode)
+        return
+    try:
+        pose = telemetry.pose
+        await services.setpoints.start(Setpoint(pose.position.copy(), float(pose.attitude[2])))
+        await services.autopilot.take_gimbal()
+    except AutopilotError as error:
+        services.raise_event("abort", error=str(error))
+        return
+    state = mission.states[configuration.leaf]
+    if state.do is not None and behaviours()[state.do].needs_vision and services.perception.estimate() is None:
+        services.perception.watch_blade(True)
+        if services.memory.hub is not None:
+            services.raise_event("vision_lost", resumed=True)
+
+
+def remembered(recorded: Mapping[str, Any]) -> Memory:
+    """Memory as a journal's line has it; names that are not known any more are passed over."""
+    known = {entry.name: recorded[entry.name] for entry in fields(Memory) if entry.name in recorded}
+    for name in ("home", "hub"):
+        if known.get(name) is not None:
+            north, east, down = known[name]
+            known[name] = (float(north), float(east), float(down))
+    return Memory(**known)
+
+
+def check_format(journal: Path, entries: tuple[Entry, ...]) -> None:
+    """Refuse what this program cannot read.
+
+    Raises:
+        ResumeError: saying why.
+    """
+    first = entries[0]
+    if first.kind != "start":
+        raise ResumeError(f"{journal}:1: begins with {first.kind!r}, not with 'start': not the journal of a run")
+    found = first.fields.get("format")
+    if found != FORMAT:
+        raise ResumeError(f"{journal}:1: written in format {found}, this program reads format {FORMAT}")
+
+
+def _configuration(entry: Entry) -> Configuration:
+    leaf = entry.fields["to"] if entry.kind == "transition" else entry.fields["state"]
+    return Configuration(str(leaf), dict(entry.fields.get("history", {})), dict(entry.fields.get("taken", {})))
