@@ -1,0 +1,132 @@
+"""The rotor from afar: its hub and the directions of its three blades in one picture, or why they cannot be told.
+
+The hub is where the axes of three equal blades meet, not the nose of the spinner that hides it: from aside the nose stands
+before another point than the hub's centre.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.camera import Camera
+from vision.capture import Image
+from vision.observation import FarView
+from vision.rotor_fit import Fit, Picture, fit_rotor
+from vision.rotor_model import surprise
+from vision.rotor_search import guesses
+
+Array = NDArray[np.float64]
+
+WORKING_PX = 800  # pictures wider than this are halved
+MODEL_HUB_PX = 1.0  # what equal straight edges leave out: foreshortening, twist, bend
+MODEL_DIRECTION = np.deg2rad(0.4)
+LEAST_SUPPORT = 0.5
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Where the survey expects the hub, in the image frame, px of the full image, and how far off it may be (sigma)."""
+
+    hub: Array
+    sigma_px: float
+
+
+def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -> FarView:
+    """Hub and blades in a picture (h, w, 3) BGR or (h, w) grey taken from 30 to 80 m before the rotor.
+
+    camera: of this picture; with another size the view is refused. Directions and hub are in the image frame as the lens
+    draws it, px of the full image.
+    """
+    started = time.perf_counter()
+    if image.shape[:2] != (camera.height, camera.width):
+        size = f"{image.shape[1]} x {image.shape[0]}"
+        return FarView(False, (f"the picture is {size} px, the camera {camera.width} x {camera.height}",))
+    factor = 1
+    while camera.width // factor > WORKING_PX:
+        factor *= 2
+    small = camera.shrunk(factor)
+    if factor > 1:
+        image = np.asarray(cv2.resize(image, (small.width, small.height), interpolation=cv2.INTER_AREA), np.uint8)
+    picture = _picture(image, small)
+    near, within = (expected.hub / factor, 4 * expected.sigma_px / factor) if expected is not None else (None, np.inf)
+    fits = [fit_rotor(picture, guess) for guess in guesses(picture.planes, near, within)]
+    elapsed = {"far_view": (time.perf_counter() - started) * 1e3}
+    if not fits:
+        return FarView(False, ("no three equal blades around a hub",), elapsed_ms=elapsed)
+    order = sorted(fits, key=lambda fit: -_merit(fit))
+    best = order[0]
+    reasons = _doubts(best, small)
+    rival = next((fit for fit in order[1:] if _elsewhere(fit, best)), None)
+    if rival is not None and _merit(rival) > 0.85 * _merit(best):
+        reasons.append("two rotors fit the picture about as well")
+    if reasons:
+        return FarView(False, tuple(reasons), elapsed_ms=elapsed)
+    hub, directions = _as_drawn(best, small)
+    turn = np.argsort(directions)
+    return FarView(
+        True,
+        (),
+        hub * factor,
+        float(np.hypot(best.hub_sigma_px, MODEL_HUB_PX)) * factor,
+        directions[turn],
+        np.hypot(best.direction_sigma, MODEL_DIRECTION)[turn],
+        elapsed,
+    )
+
+
+def _picture(image: Image, camera: Camera) -> Picture:
+    """Grey, and where there is colour how yellow or blue it is: a grey blade before a blue sky may be equally bright."""
+    if image.ndim == 3:
+        colour = image.astype(np.float32)
+        grey = colour @ np.array([0.114, 0.587, 0.299], np.float32)
+        planes = np.dstack([grey, (colour[..., 2] - colour[..., 0]) * 0.7])
+    else:
+        planes = image.astype(np.float32)[..., None]
+    rough = planes[:, 2:] - 2 * planes[:, 1:-1] + planes[:, :-2]
+    noise = max(0.4, 1.4826 * float(np.median(np.abs(rough[::4]))) / np.sqrt(6.0))
+    blurred = cv2.GaussianBlur(planes, (0, 0), 1.0).reshape(planes.shape)
+    return Picture(blurred, camera, 0.5 * noise)
+
+
+def _merit(fit: Fit) -> float:
+    return fit.agreement if np.isfinite(fit.hub_sigma_px) else 0.0
+
+
+def _doubts(fit: Fit, camera: Camera) -> list[str]:
+    reasons = []
+    best = (fit.support * np.minimum(fit.samples / 12, 1)).max(axis=1)
+    if best.min() < LEAST_SUPPORT:
+        reasons.append(f"only {int((best >= LEAST_SUPPORT).sum())} of three blades have an edge where it should be")
+    elif fit.support.mean() < LEAST_SUPPORT:
+        reasons.append(f"the blades' edges are seen over {fit.support.mean():.0%} of their length only")
+    gaps = np.diff(np.sort(fit.directions), append=np.sort(fit.directions)[0] + 2 * np.pi)
+    if np.abs(np.degrees(gaps) - 120).max() > 12:
+        reasons.append("the blades are not 120° apart")
+    if np.abs(surprise(fit.parameters[None])).max() > 4:
+        reasons.append("the blades have no blade's proportions")
+    if np.any(np.abs(fit.parameters[:2]) > 0.95 * camera.centre):
+        reasons.append("the hub lies outside the picture")
+    if not (fit.hub_sigma_px < 4 and fit.direction_sigma.max() < np.deg2rad(2)):
+        reasons.append("the edges do not determine the hub")
+    return reasons
+
+
+def _elsewhere(one: Fit, other: Fit) -> bool:
+    turn = np.angle(np.exp(3j * (one.directions[0] - other.directions[0]))) / 3
+    return bool(np.linalg.norm(one.parameters[:2] - other.parameters[:2]) > 25 or abs(turn) > np.deg2rad(8))
+
+
+def _as_drawn(fit: Fit, camera: Camera) -> tuple[Array, Array]:
+    """Hub (2,) and directions (3,) in the image frame as the lens draws them."""
+    directions, hub = fit.directions, fit.parameters[:2]
+    ends = hub + 20 * np.column_stack([np.cos(directions), np.sin(directions)])
+    ideal = np.vstack([hub, ends]) + camera.centre
+    rays = (ideal - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    drawn = camera.project(np.column_stack([np.ones(4), rays])) - camera.centre
+    step = drawn[1:] - drawn[0]
+    return drawn[0], np.arctan2(step[:, 1], step[:, 0]) % (2 * np.pi)

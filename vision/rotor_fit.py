@@ -1,0 +1,214 @@
+"""Fits the rotor model to the edges in a picture: first to the picture as a whole, then to a fraction of a pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from vision.camera import Camera
+from vision.rotor_model import TILT, directions, outline, surprise
+from vision.rotor_search import Guess
+
+Array = NDArray[np.float64]
+
+SAMPLES = 90  # along each edge
+REACHES = (5.0, 4.0, 3.0)  # px across the expected edge in which it is looked for, round by round
+EDGE_PX = 1.0  # sigma of one edge point: what straight edges leave out, more than what the picture does
+NEIGHBOURS = 6.0  # points that err together
+AGREES_PX = 2.5
+SCALE = np.array([1.0, 1.0, 0.01, 0.1, 0.1, 1.0, 1.0, 1e-3])
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Channels (h, w, c) as float32, slightly blurred, seen through a camera; `noise` in grey levels of any channel."""
+
+    planes: NDArray[np.float32]
+    camera: Camera
+    noise: float
+
+    @cached_property
+    def gradient(self) -> NDArray[np.float32]:
+        """(h, w, 2): the derivatives (right, down) of the channel that changes most, grey levels a pixel."""
+        shape = self.planes.shape
+        both = [cv2.Sobel(self.planes, cv2.CV_32F, *order, scale=0.125).reshape(shape) for order in ((1, 0), (0, 1))]
+        strongest = np.argmax(np.abs(both[0]) + np.abs(both[1]), axis=2)[..., None]
+        return np.concatenate([np.take_along_axis(g, strongest, 2) for g in both], axis=2)
+
+    def pixels(self, points: Array) -> Array:
+        """Where the lens draws points (…, 2) of the undistorted image frame, in pixels."""
+        camera = self.camera
+        pixels = points + camera.centre
+        if any(camera.distortion):
+            rays = (pixels.reshape(-1, 2) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+            pixels = camera.project(np.column_stack([np.ones(len(rays)), rays])).reshape(points.shape)
+        return np.asarray(pixels, float)
+
+    def at(self, points: Array) -> Array:
+        """Values (n, m, c) at points (n, m, 2) of the undistorted image frame."""
+        pixels = self.pixels(points).astype(np.float32)
+        u, v = np.ascontiguousarray(pixels[..., 0]), np.ascontiguousarray(pixels[..., 1])
+        values = cv2.remap(self.planes, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(values, float).reshape(*points.shape[:-1], -1)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The fitted rotor. parameters (8,): of `vision.rotor_model`. directions (3,) of the blades in the undistorted image.
+
+    support (3, 2): for each blade, leading and trailing, the share of samples (3, 2) inside the picture that lie on the fitted
+    edge. agreement: share of the edges' whole length on which the picture changes across them.
+    """
+
+    parameters: Array
+    hub_sigma_px: float
+    directions: Array
+    direction_sigma: Array
+    support: Array
+    samples: Array
+    residual_px: float
+    agreement: float
+
+
+def fit_rotor(picture: Picture, guess: Guess) -> Fit:
+    """The guess moved to where the edges really are, with its support."""
+    third = 2 * np.pi / 3
+    turn = float(np.angle(np.exp(3j * guess.directions).sum()) / 3)
+    turn += third * np.round((guess.directions[0] - turn) / third)
+    start = np.array([*guess.hub, turn, 0.0, TILT[0], guess.leading, guess.trailing, 1 / guess.length])
+    parameters, agreement = settled(picture, start)
+    edges = edge_points(picture, parameters, REACHES[0])
+    jacobian = np.zeros((0, len(SCALE)))
+    for reach in REACHES:
+        edges = edge_points(picture, parameters, reach)
+        if edges.real.sum() < 30:
+            break
+        arguments = (edges.only(edges.real), picture.camera)
+        solution = least_squares(_residuals, parameters, args=arguments, x_scale=SCALE, loss="soft_l1", f_scale=1.5)
+        parameters, jacobian = solution.x, solution.jac
+    residual = EDGE_PX * _residuals(parameters, edges, picture.camera)[: len(edges.real)]
+    agrees = edges.real & (np.abs(residual) < AGREES_PX)
+    support, samples = np.zeros((3, 2)), np.zeros((3, 2))
+    for b in range(3):
+        for s in range(2):
+            here = (edges.blade == b) & (edges.side == s)
+            samples[b, s] = here.sum()
+            support[b, s] = agrees[here].mean() if here.any() else 0.0
+    rms = float(np.sqrt(np.mean(residual[agrees] ** 2))) if agrees.any() else np.inf
+    covariance = np.full((8, 8), np.inf)
+    if agrees.sum() > 30:
+        covariance = np.linalg.pinv(jacobian.T @ jacobian) * max(rms / EDGE_PX, 0.7) ** 2 * NEIGHBOURS
+    here = directions(parameters, picture.camera)
+    return Fit(
+        parameters,
+        float(np.sqrt((covariance[0, 0] + covariance[1, 1]) / 2)),
+        here,
+        np.full(3, np.sqrt(covariance[2, 2])),
+        support,
+        samples,
+        rms,
+        agreement,
+    )
+
+
+def settled(picture: Picture, start: Array, rounds: int = 5, tries: int = 400) -> tuple[Array, float]:
+    """The parameters (8,) near `start` whose six edges the picture agrees with most, and that agreement, 0 to 1.
+
+    A cross-entropy search: any line of the background may be stronger than one edge of one blade, but nothing else agrees with
+    all six at once. The same picture gives the same answer.
+    """
+    rng = np.random.default_rng(0)
+    width = start[5] + start[6]
+    mean = start.copy()
+    spread = np.array([4, 4, 0.02, 0.15, 0.06, 0.08 * width + 1, 0.12 * width + 1, 0.2 * start[7]])
+    best, best_value = start, -np.inf
+    for _ in range(rounds):
+        drawn = mean + spread * rng.standard_normal((tries, 8))
+        drawn[0] = best
+        value = agreement(picture, drawn) - 0.01 * (surprise(drawn) ** 2).sum(axis=1)
+        order = np.argsort(-value)[: tries // 12]
+        if value[order[0]] > best_value:
+            best, best_value = drawn[order[0]], float(value[order[0]])
+        mean, spread = drawn[order].mean(axis=0), 1.1 * drawn[order].std(axis=0) + 1e-6
+    return best, float(agreement(picture, best[None])[0])
+
+
+def agreement(picture: Picture, parameters: Array, samples: int = 40) -> Array:
+    """(k,): share of the six edges' length, 0 to 1, on which the picture changes across them, for parameters (k, 8)."""
+    edges = outline(parameters, np.linspace(0, 1, samples), picture.camera)
+    half = picture.camera.centre - 2
+    inside = np.all(np.abs(edges.points) < half, axis=-1)
+    height, width = picture.planes.shape[:2]
+    pixels = np.rint(picture.pixels(edges.points)).astype(np.int64)
+    u, v = np.clip(pixels[..., 0], 0, width - 1), np.clip(pixels[..., 1], 0, height - 1)
+    gradient = picture.gradient[v, u]
+    cos, sin = edges.direction[..., None, 0], edges.direction[..., None, 1]
+    across = np.abs(gradient[..., 1] * cos - gradient[..., 0] * sin)
+    along = np.abs(gradient[..., 0] * cos + gradient[..., 1] * sin)
+    step = np.clip((across - 0.5 * along) / (4 * picture.noise + 1.0), 0, 1) * inside
+    # An edge that hardly enters the picture says little, and as little as it says it may count.
+    shares = step.sum(axis=-1) / np.maximum(inside.sum(axis=-1), samples / 4)
+    return np.asarray(shares.mean(axis=(1, 2)), float)
+
+
+@dataclass(frozen=True)
+class EdgePoints:
+    """Points (n, 2) on edges in the picture; the blade (n,), side (n,) and share (n,) of the straight stretch where each was
+    looked for, the direction (n, 2) across the edge, and whether there is a step of brightness at all."""
+
+    points: Array
+    blade: NDArray[np.int64]
+    side: NDArray[np.int64]
+    share: NDArray[np.int64]
+    across: Array
+    real: NDArray[np.bool_]
+
+    def only(self, keep: NDArray[np.bool_]) -> EdgePoints:
+        """Those of them."""
+        return EdgePoints(
+            self.points[keep],
+            self.blade[keep],
+            self.side[keep],
+            self.share[keep],
+            self.across[keep],
+            self.real[keep],
+        )
+
+
+def edge_points(picture: Picture, parameters: Array, reach: float) -> EdgePoints:
+    """The strongest step across each edge of a rotor (8,), within `reach` px of where the model has it."""
+    edges = outline(parameters[None], np.linspace(0, 1, SAMPLES), picture.camera)
+    half = picture.camera.centre - 3 - reach
+    shifts = np.arange(-reach - 1, reach + 2)
+    blade, side, share = np.nonzero(np.all(np.abs(edges.points[0]) < half, axis=-1))
+    middle = edges.points[0][blade, side, share]
+    along = edges.direction[0][blade, side]
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    if len(middle) == 0:
+        return EdgePoints(middle, blade, side, share, across, np.zeros(0, bool))
+    values = picture.at(middle[:, None, :] + shifts[:, None] * across[:, None, :])
+    slope = values[:, 2:] - values[:, :-2]
+    same = (blade[1:] == blade[:-1]) & (side[1:] == side[:-1])
+    summed = slope.copy()
+    summed[1:][same] += slope[:-1][same]
+    summed[:-1][same] += slope[1:][same]
+    size = np.linalg.norm(summed, axis=2) / 3
+    best = np.argmax(size[:, 1:-1], axis=1) + 1
+    rows = np.arange(len(middle))
+    before, peak, after = size[rows, best - 1], size[rows, best], size[rows, best + 1]
+    bend = np.minimum(before - 2 * peak + after, -1e-9)
+    offset = shifts[1:-1][best] + np.clip(0.5 * (before - after) / bend, -0.5, 0.5)
+    return EdgePoints(middle + offset[:, None] * across, blade, side, share, across, peak > 3 * picture.noise)
+
+
+def _residuals(parameters: Array, edges: EdgePoints, camera: Camera) -> Array:
+    """Distance (n,) of edge points from the model's edges, then (4,) what is known of any rotor, in units of their sigma."""
+    model = outline(parameters[None], np.linspace(0, 1, SAMPLES), camera).points[0]
+    off = ((edges.points - model[edges.blade, edges.side, edges.share]) * edges.across).sum(axis=1) / EDGE_PX
+    result: Array = np.concatenate([off, surprise(parameters[None])[0] * np.sqrt(NEIGHBOURS)])
+    return result
