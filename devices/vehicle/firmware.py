@@ -247,7 +247,9 @@ class Firmware:
         elif self.failsafe is None and not self.offboard_fresh:
             action = int(self.parameters["COM_OBL_RC_ACT"])
             if action == 7:
-                self._note("failsafe", reason="offboard_lost", action="DISARM", setpoint_s=self.setpoint_s)
+                self._note(
+                    "failsafe", reason="offboard_lost", action="DISARM", setpoint_s=round(self.setpoint_s or 0.0, 3)
+                )
                 self._disarm("offboard_lost")
                 return
             modes = {4: Mode.LAND, 5: Mode.HOLD}
@@ -331,7 +333,7 @@ class Firmware:
 
     def _fail(self, reason: str, mode: Mode) -> None:
         self.failsafe = reason
-        self._note("failsafe", reason=reason, action=mode.name, setpoint_s=self.setpoint_s)
+        self._note("failsafe", reason=reason, action=mode.name, setpoint_s=round(self.setpoint_s or 0.0, 3))
         self._say(Severity.CRITICAL, f"Failsafe activated: {reason.replace('_', ' ')}, {mode.name}")
         self._enter(mode)
 
