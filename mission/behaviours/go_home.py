@@ -18,19 +18,19 @@ class GoHome(Parameters):
     """Parameters of `go_home`."""
 
     speed_m_s: float = Field(5.0, gt=0, le=10, description="speed on the way")
-    descend_m_s: float = Field(3.0, gt=0, le=4, description="speed of the descent")
     height_m: float = Field(8.0, ge=3, le=50, description="height over the take-off point at which this ends")
 
 
 @behaviour(outcomes={"done": "over the take-off point, ready to land"}, parameters=GoHome)
 async def go_home(services: Services, parameters: GoHome) -> str:
-    """Fly level to above the take-off point, then descend. Needs no images."""
+    """Fly to above the take-off point and descend: straight where the way is free. Needs no images."""
     services.perception.watch_blade(False)
     home = np.array(services.memory.home or (0.0, 0.0, 0.0))
     here = target_or_here(services)
-    low = home[2] - parameters.height_m
-    level = np.array([home[0], home[1], min(here.position[2], low)])
-    await fly_to(services, level, here.yaw, speed_m_s=parameters.speed_m_s, tolerance_m=1.5)
-    above = np.array([home[0], home[1], low])
-    await fly_to(services, above, here.yaw, speed_m_s=parameters.descend_m_s, tolerance_m=1.0)
+    above = np.array([home[0], home[1], home[2] - parameters.height_m])
+    keep_out = services.setpoints.keep_out
+    if keep_out is not None and not keep_out.path_clear(here.position, above):
+        level = np.array([home[0], home[1], min(here.position[2], above[2])])
+        await fly_to(services, level, here.yaw, speed_m_s=parameters.speed_m_s, tolerance_m=1.5)
+    await fly_to(services, above, here.yaw, speed_m_s=parameters.speed_m_s, tolerance_m=1.0)
     return "done"

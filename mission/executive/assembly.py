@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Coroutine
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
@@ -16,7 +17,8 @@ from mission.executive.stage import FlightError, Stage, lockstep_stage, wall_sta
 
 if TYPE_CHECKING:
     from flight.turbine import Turbine
-    from mission.executive.executive import Ask, Autonomy, Executive, Question
+    from mission.executive.decision import Autonomy
+    from mission.executive.executive import Ask, Executive, Question
     from mission.executive.journal import Journal
     from mission.language.document import Mission
     from mission.record.folder import RunFolder
@@ -141,7 +143,7 @@ def _compose(
         KeepOut(turbine, mission.limits.clearance_m),
         on_sent=recorder.sent,
         on_event=lambda name: executive.raise_event(name),
-        **({"wall": stage.clock.now} if options.lockstep else {}),
+        wall=stage.clock.now if options.lockstep else time.monotonic,
     )
     perception = VisionLoop(
         rig=stage.rig,
