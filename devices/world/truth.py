@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from devices.world.nearest import distances
 from devices.world.raycast import cast
+from devices.world.silhouette import edges, outlines
 from devices.world.turbine import INSPECTED, TurbineShape
 from vision.camera import Camera
 from vision.capture import CameraPose, camera_pose, rotation_of
@@ -127,14 +128,12 @@ def coverage(
     camera truly saw it: of each section's outline the point farthest to that side in the image."""
     root, tip = shape.visible_root_m, shape.blade.tip_radius_m
     stations = np.linspace(root, tip - 0.02, int(np.ceil((tip - root) / STATION_STEP_M)) + 1)
-    frame = shape.blade_frame()
-    outline = shape.blade.sections(stations)
-    outline = frame.to_ned(outline.reshape(-1, 3)).reshape(outline.shape)
+    outline = outlines(shape, stations)
     seen = np.zeros(len(stations), bool)
     for one in photographs:
         if one.side == side:
             pose = flight.camera(one.stamp_s, mount)
-            near = np.abs(frame.to_blade(pose.position)[0] - stations) < 25.0
+            near = np.abs(shape.blade_frame().to_blade(pose.position)[0] - stations) < 25.0
             new = np.flatnonzero(near & ~seen)
             seen[new[_edge_seen(shape, outline[new], camera, pose, side)]] = True
     return float(seen.mean())
@@ -144,15 +143,7 @@ def _edge_seen(shape: TurbineShape, outline: Array, camera: Camera, pose: Camera
     """Which of the sections (n, m, 3) show their edge of that side to the camera."""
     if len(outline) == 0:
         return np.zeros(0, bool)
-    frame = shape.blade_frame()
-    pixels = camera.project(pose.from_ned(outline.reshape(-1, 3))).reshape(*outline.shape[:2], 2)
-    span, across = frame.span @ pose.rotation, frame.across @ pose.rotation
-    sideways = np.array([-span[2], span[1]])
-    sideways *= np.sign(sideways @ across[1:]) * (1.0 if side == "leading" else -1.0)
-    reach = np.where(np.isnan(pixels[..., 0]), -np.inf, pixels @ sideways)
-    rows = np.arange(len(outline))
-    edge = reach.argmax(axis=1)
-    at, points = pixels[rows, edge], outline[rows, edge]
+    at, points = edges(shape, outline, camera, pose, side)
     with np.errstate(invalid="ignore"):
         inside = np.all((at >= 0) & (at <= [camera.width - 1, camera.height - 1]), axis=1)
     offset = points - pose.position
@@ -160,7 +151,7 @@ def _edge_seen(shape: TurbineShape, outline: Array, camera: Camera, pose: Camera
     distance, hit = cast(shape.mesh, pose.position, offset / length[:, None], length - 0.05)
     part = shape.mesh.part[np.maximum(hit, 0)]
     hidden = (hit >= 0) & ((part != INSPECTED) | (distance < length - SELF_M))
-    result: NDArray[np.bool_] = inside & ~hidden & np.isfinite(reach[rows, edge])
+    result: NDArray[np.bool_] = inside & ~hidden
     return result
 
 

@@ -13,6 +13,7 @@ from devices.world.background import background, surroundings
 from devices.world.raycast import cast, hidden
 from devices.world.sensor import Sensor, add_spots
 from devices.world.settings import WorldSettings
+from devices.world.silhouette import edges, outlines
 from devices.world.skin import lit, skins
 from devices.world.turbine import BLADES, INSPECTED, SKY, TurbineShape
 from vision.camera import Camera, RigGeometry
@@ -222,7 +223,8 @@ class Renderer:
                 if eye == 0:
                     spot_part = spots.part[which]
         stations = np.linspace(self.shape.visible_root_m, self.shape.blade.tip_radius_m, 400)
-        leading, trailing = (camera.project(pose.from_ned(edge)) for edge in self.shape.edges(stations))
+        outline = outlines(self.shape, stations)
+        leading, trailing = (edges(self.shape, outline, camera, pose, side)[0] for side in ("leading", "trailing"))
         frames = [self.shape.blade_frame(number) for number in range(len(BLADES))]
         hub = camera.project(pose.from_ned(self.shape.hub))[0]
         # A blade's image is a straight line through the hub's: its direction comes from a point close to the hub.
