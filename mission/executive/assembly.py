@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mission.executive.belief import located, surveyed_turbine
+from mission.executive.resume import Interrupted, interrupted, restore, where
 from mission.executive.signals import interrupting
 from mission.executive.simulation import Rehearsal
 from mission.executive.stage import FlightError, Stage, lockstep_stage, wall_stage
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FlightError", "FlightOptions", "FlightResult", "fly"]
 
+JOURNAL = "journal.jsonl"
 CONNECT_S = 20.0
 SIMULATED_LATENCY_S = 0.06  # of capture and vision, in lockstep time, where computing takes no time at all
 
@@ -69,18 +71,20 @@ def fly(options: FlightOptions) -> FlightResult:
     """
     from mission.record.run_log import RunLog
 
+    past = None if options.resume is None else interrupted(options.resume / JOURNAL, options.mission)
+    start_s = 0.0 if past is None else past.t
     log = RunLog(options.folder.log)
     try:
-        with lockstep_stage(options) if options.lockstep else wall_stage(options) as stage:
+        with lockstep_stage(options, start_s) if options.lockstep else wall_stage(options, start_s) as stage:
             if stage.world is not None:
                 _ = stage.world.renderer  # drawn for the first time before anything flies
             with asyncio.Runner(loop_factory=stage.loop_factory) as runner:
-                return runner.run(_fly(options, stage, log.logger))
+                return runner.run(_fly(options, stage, past, log.logger))
     finally:
         log.close()
 
 
-async def _fly(options: FlightOptions, stage: Stage, log: Any) -> FlightResult:
+async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, log: Any) -> FlightResult:
     """Connect, fly, and close everything that was opened, whatever happens."""
     from flight.autopilot import AutopilotError
     from mission.executive.journal import Journal
@@ -98,7 +102,7 @@ async def _fly(options: FlightOptions, stage: Stage, log: Any) -> FlightResult:
             return FlightResult("refused", options.mission.initial, False)
         journal = Journal(options.folder.journal, threaded=not options.lockstep)
         recorder = RunRecorder(options.folder, stage.rig.geometry.stereo.left, log, inline=options.lockstep)
-        executive, running = _compose(options, stage, journal, recorder, log)
+        executive, running = _compose(options, stage, journal, recorder, past, log)
         loop = asyncio.get_running_loop()
         tasks = [loop.create_task(work, name=name) for name, work in running.items()]
         options.on_start(executive)
@@ -120,7 +124,12 @@ async def _fly(options: FlightOptions, stage: Stage, log: Any) -> FlightResult:
 
 
 def _compose(
-    options: FlightOptions, stage: Stage, journal: Journal, recorder: RunRecorder, log: Any
+    options: FlightOptions,
+    stage: Stage,
+    journal: Journal,
+    recorder: RunRecorder,
+    past: Interrupted | None,
+    log: Any,
 ) -> tuple[Executive, dict[str, Coroutine[Any, Any, None]]]:
     """The executive with its services, and what has to run beside it, by name."""
     from flight.keepout import KeepOut
@@ -176,7 +185,18 @@ def _compose(
         locate=lambda sights: located(services.turbine, camera, sights),
         on_turbine_refined=refined,
     )
-    executive = Executive(mission, services, stage.clock, journal, ask=_asking(options), autonomy=options.autonomy)
+    in_air = stage.autopilot.telemetry.in_air
+    if past is not None:
+        restore(services, past, in_air=in_air)
+    executive = Executive(
+        mission,
+        services,
+        stage.clock,
+        journal,
+        ask=_asking(options),
+        autonomy=options.autonomy,
+        resume=None if past is None else where(mission, past, in_air=in_air),
+    )
     beside: dict[str, Coroutine[Any, Any, None]] = {
         "vision": perception.run(),
         "telemetry": recorder.follow(stage.clock, stage.autopilot, setpoints),

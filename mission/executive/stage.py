@@ -41,7 +41,7 @@ class Stage:
 
 
 @contextmanager
-def lockstep_stage(options: FlightOptions) -> Iterator[Stage]:
+def lockstep_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
     """Everything in this process, and time that advances only as fast as it is computed."""
     from devices.simulated_rig import SimulatedRig
     from devices.vehicle.fault_switches import FaultSwitches
@@ -54,8 +54,8 @@ def lockstep_stage(options: FlightOptions) -> Iterator[Stage]:
     mission = options.mission
     world = build_world(mission)
     vehicle = SimulatedVehicle(VehicleSettings.of_world(world.settings), world.settings.seed, world.forward_range)
-    autopilot = LockstepAutopilot(vehicle, TruthLog(options.folder.telemetry, vehicle, wall=False))
-    clock = LockstepClock()
+    autopilot = LockstepAutopilot(vehicle, TruthLog(options.folder.telemetry, vehicle, wall=False), start_s)
+    clock = LockstepClock(start_s)
 
     def true_pose() -> TruePose:
         truth = vehicle.pose()
@@ -71,7 +71,7 @@ def lockstep_stage(options: FlightOptions) -> Iterator[Stage]:
 
 
 @contextmanager
-def wall_stage(options: FlightOptions) -> Iterator[Stage]:
+def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
     """A vehicle behind a socket, ours or another, and wall time, scaled where the vehicle's time is."""
     from flight.mavsdk_link import MavsdkAutopilot
 
@@ -86,7 +86,7 @@ def wall_stage(options: FlightOptions) -> Iterator[Stage]:
             vehicle = _spawn(options, speed)
             stack.callback(vehicle.stop)
             system = vehicle.system_address
-        clock = WallClock(speed)
+        clock = WallClock(speed, start_s)
         stack.callback(clock.close)
         autopilot = MavsdkAutopilot(
             system,
