@@ -11,9 +11,9 @@ from typing import Any
 from pymavlink.dialects.v20 import development as mavlink
 
 from devices.vehicle import gimbal_messages, status_messages
-from devices.vehicle.firmware import Result
 from devices.vehicle.modes import Mode
 from devices.vehicle.motion_messages import local_position
+from devices.vehicle.results import Result
 from devices.vehicle.streams import StreamScheduler
 from devices.vehicle.udp_link import AUTOPILOT, GIMBAL, UdpLink
 from devices.vehicle.vehicle import SimulatedVehicle

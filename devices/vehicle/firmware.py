@@ -5,40 +5,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from enum import IntEnum
 from typing import Any
 
 from devices.vehicle.battery import Battery
 from devices.vehicle.body import Body
 from devices.vehicle.control import NAN, Controller, Target
 from devices.vehicle.estimator import VALID_AFTER_S, Estimator
+from devices.vehicle.failsafes import Failsafes
 from devices.vehicle.gimbal import Gimbal
 from devices.vehicle.modes import Flight, Flying, Hold, Land, Mode, Offboard, Piloted, ReturnHome, Sticks, TakeOff
 from devices.vehicle.parameters import ParameterTable
+from devices.vehicle.results import Result, Severity
 
 _LANDED_AFTER_S = 2.0
-_OFFBOARD_BACK_S = 0.04
-_BATTERY_HOLD_S = 5.0
-_GCS_GRACE_S = 2.0
 _IDLE_THRUST = 1.5
-
-
-class Result(IntEnum):
-    """MAV_RESULT."""
-
-    ACCEPTED = 0
-    TEMPORARILY_REJECTED = 1
-    DENIED = 2
-    UNSUPPORTED = 3
-    FAILED = 4
-
-
-class Severity(IntEnum):
-    """MAV_SEVERITY, those that are used."""
-
-    CRITICAL = 2
-    WARNING = 4
-    INFO = 6
 
 
 class Firmware:
@@ -70,19 +50,14 @@ class Firmware:
         self.landed = True
         self.taking_off = False
         self.mode = self.intended = Mode.HOLD
-        self.failsafe: str | None = None
+        self.failsafes = Failsafes(self, battery, note, say)
         self.terminated = False
         self.setpoint_s: float | None = None
         self.pilot_s: float | None = None
-        self.gcs_s: float | None = None
-        self._gcs_lost = False
         self._flying: Flying = Hold(estimate)
         self._armed_s = self._landed_s = self._contact_s = 0.0
-        self._back_s: float | None = None
         self._before_landing = Mode.HOLD
         self._take_off_down: float | None = None
-        self._battery_stage = 0
-        self._battery_act_s = 0.0
         self._resets = 0
 
     # Commands
@@ -101,7 +76,7 @@ class Firmware:
         estimate = self._estimate
         self.flight.home = (estimate.n, estimate.e, estimate.d)
         self._controller.reset(estimate)
-        self._enter(self.mode)
+        self.enter(self.mode)
         self._note("armed")
         self._say(Severity.INFO, "Armed by external command")
         return Result.ACCEPTED
@@ -112,7 +87,7 @@ class Firmware:
             self._say(Severity.CRITICAL, "Disarming denied: not landed")
             return Result.TEMPORARILY_REJECTED
         if self.armed:
-            self._disarm("command")
+            self.drop("command")
         return Result.ACCEPTED
 
     def set_mode(self, mode: Mode) -> Result:
@@ -170,14 +145,12 @@ class Firmware:
         self._note("pilot", mode=mode.name)
         self._intend(mode)
 
-    def gcs_heartbeat(self) -> None:
-        """A ground station was heard."""
-        if self._gcs_lost:
-            self._gcs_lost = False
-            self._note("datalink_regained")
-        self.gcs_s = self.time_s
-
     # State
+
+    @property
+    def failsafe(self) -> str | None:
+        """Why `mode` is not what is intended."""
+        return self.failsafes.reason
 
     @property
     def has_pilot(self) -> bool:
@@ -220,12 +193,12 @@ class Firmware:
         if self._estimate.resets != self._resets:
             self._resets = self._estimate.resets
             self._flying.shift(*self._estimate.last_jump)
-        self._watch_datalink()
+        self.failsafes.watch_datalink()
         if not self.armed:
             self._body.thrust_command = 0.0
             return None
-        self._watch_offboard()
-        self._watch_battery()
+        self.failsafes.watch_offboard()
+        self.failsafes.watch_battery()
         target = self.target = self._flying.target(self.flight, seconds)
         if self._flying.done:
             self._enter_next()
@@ -233,65 +206,6 @@ class Firmware:
             self._body.thrust_command = 0.0 if not self.armed else _IDLE_THRUST
             return None
         return target
-
-    def _watch_offboard(self) -> None:
-        if self.intended is not Mode.OFFBOARD:
-            return
-        if self.failsafe == "offboard_lost":
-            if self.offboard_fresh:
-                self._back_s = self._back_s if self._back_s is not None else self.time_s
-                if self.time_s - self._back_s >= _OFFBOARD_BACK_S:
-                    self._leave_failsafe()
-            else:
-                self._back_s = None
-        elif self.failsafe is None and not self.offboard_fresh:
-            action = int(self.parameters["COM_OBL_RC_ACT"])
-            if action == 7:
-                self._note(
-                    "failsafe", reason="offboard_lost", action="DISARM", setpoint_s=round(self.setpoint_s or 0.0, 3)
-                )
-                self._disarm("offboard_lost")
-                return
-            modes = {4: Mode.LAND, 5: Mode.HOLD}
-            if self.has_pilot:
-                modes |= {0: Mode.POSCTL, 1: Mode.ALTCTL, 2: Mode.MANUAL}
-            self._fail("offboard_lost", modes.get(action, Mode.RTL))
-            self._back_s = None
-
-    def _watch_battery(self) -> None:
-        left, p = self._battery.percent / 100, self.parameters
-        action = int(p["COM_LOW_BAT_ACT"])
-        if self._battery_stage == 0 and left < float(p["BAT_LOW_THR"]):
-            self._battery_stage = 1
-            self._note("battery_low", percent=self._battery.percent)
-            self._say(Severity.WARNING, "Low battery level")
-        if self._battery_stage == 1 and left < float(p["BAT_CRIT_THR"]):
-            self._battery_stage = 2
-            self._say(Severity.CRITICAL, "Critical battery level! Return now")
-            if action in (2, 3) and not self.mode.piloted and self.mode not in (Mode.LAND, Mode.RTL):
-                self._fail("battery_critical", Mode.HOLD)
-                self._battery_act_s = self.time_s + _BATTERY_HOLD_S
-        if self.failsafe == "battery_critical" and self.mode is Mode.HOLD and self.time_s >= self._battery_act_s:
-            self._fail("battery_critical", Mode.LAND)
-        if self._battery_stage == 2 and left < float(p["BAT_EMERGEN_THR"]):
-            self._battery_stage = 3
-            self._say(Severity.CRITICAL, "Emergency battery level! Land immediately")
-            if action in (2, 3) and not self.mode.piloted and self.mode is not Mode.LAND:
-                self._fail("battery_emergency", Mode.LAND)
-
-    def _watch_datalink(self) -> None:
-        if self.gcs_s is None or self._gcs_lost:
-            return
-        limit = float(self.parameters["COM_DL_LOSS_T"])
-        if self.time_s - self.gcs_s < limit * (1 + _GCS_GRACE_S / 10):
-            return
-        self._gcs_lost = True
-        self._note("datalink_lost")
-        self._say(Severity.WARNING, "Connection to ground station lost")
-        modes = {1: Mode.HOLD, 2: Mode.RTL, 3: Mode.LAND}
-        action = modes.get(int(self.parameters["NAV_DLL_ACT"]))
-        if action is not None and self.armed and not self.mode.piloted and self.failsafe is None:
-            self._fail("datalink_lost", action)
 
     def _watch_ground(self, target: Target, seconds: float) -> bool:
         """Landed detection; True while the vehicle rests on the ground with idle motors."""
@@ -307,7 +221,7 @@ class Firmware:
             since = self.time_s - self._landed_s
             wait = "COM_DISARM_PRFLT" if self._landed_s == self._armed_s else "COM_DISARM_LAND"
             if since >= float(self.parameters[wait]) > 0:
-                self._disarm("auto")
+                self.drop("auto")
             return True
         self.taking_off = self.mode is Mode.TAKEOFF
         self._contact_s = self._contact_s + seconds if body.on_ground and not upward else 0.0
@@ -326,21 +240,8 @@ class Firmware:
         if mode in (Mode.LAND, Mode.RTL) and self.intended not in (Mode.LAND, Mode.RTL):
             self._before_landing = Mode.HOLD if self.intended is Mode.TAKEOFF else self.intended
         self.intended = mode
-        if self.failsafe is not None:
-            self._note("failsafe_ended", reason=self.failsafe)
-            self.failsafe = None
-        self._enter(mode)
-
-    def _fail(self, reason: str, mode: Mode) -> None:
-        self.failsafe = reason
-        self._note("failsafe", reason=reason, action=mode.name, setpoint_s=round(self.setpoint_s or 0.0, 3))
-        self._say(Severity.CRITICAL, f"Failsafe activated: {reason.replace('_', ' ')}, {mode.name}")
-        self._enter(mode)
-
-    def _leave_failsafe(self) -> None:
-        self._note("failsafe_ended", reason=self.failsafe)
-        self.failsafe = None
-        self._enter(self.intended)
+        self.failsafes.end()
+        self.enter(mode)
 
     def _enter_next(self) -> None:
         if self.mode is Mode.TAKEOFF:
@@ -348,7 +249,8 @@ class Firmware:
         elif self.mode is Mode.RTL and not isinstance(self._flying, Land):
             self._flying = Land(self._estimate)
 
-    def _enter(self, mode: Mode) -> None:
+    def enter(self, mode: Mode) -> None:
+        """Fly another mode from now on, whatever is intended."""
         if mode is not self.mode:
             self._note("mode", mode=mode.name, before=self.mode.name, failsafe=self.failsafe)
         self.mode = mode
@@ -368,15 +270,16 @@ class Firmware:
         else:
             self._flying = Hold(estimate)
 
-    def _disarm(self, by: str) -> None:
+    def drop(self, by: str) -> None:
+        """Stop the motors, wherever the vehicle is."""
         self.armed = False
         self._body.thrust_command = 0.0
         if self.mode in (Mode.LAND, Mode.RTL) or self.failsafe is not None:
             restored = self.intended if self.intended not in (Mode.LAND, Mode.RTL) else self._before_landing
-            self.failsafe = None
+            self.failsafes.reason = None
             self.intended = restored
-            self._enter(restored)
-        self._battery_stage = 0
+            self.enter(restored)
+        self.failsafes.forget_battery()
         self._note("disarmed", by=by)
         self._say(Severity.INFO, f"Disarmed by {by}")
 

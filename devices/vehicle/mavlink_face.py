@@ -69,7 +69,7 @@ class MavlinkFace:
 
     def _heartbeat(self, message: Any) -> None:
         if message.type == mavlink.MAV_TYPE_GCS:
-            self._vehicle.firmware.gcs_heartbeat()
+            self._vehicle.firmware.failsafes.gcs_heartbeat()
 
     def _setpoint(self, message: Any) -> None:
         if message.target_system not in (0, AUTOPILOT):

@@ -14,10 +14,11 @@ from devices.vehicle.battery import Battery
 from devices.vehicle.body import STEP_S, Body
 from devices.vehicle.control import Controller, Target
 from devices.vehicle.estimator import Estimator
-from devices.vehicle.firmware import Firmware, Result, Severity
+from devices.vehicle.firmware import Firmware
 from devices.vehicle.gimbal import Gimbal
 from devices.vehicle.modes import Mode
 from devices.vehicle.parameters import ParameterTable
+from devices.vehicle.results import Result, Severity
 from devices.vehicle.settings import VehicleSettings
 from devices.vehicle.wind import WindField
 

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from devices.vehicle.control import Target
-from devices.vehicle.firmware import Result
 from devices.vehicle.modes import Mode, Sticks
+from devices.vehicle.results import Result
 
 HERE = Target(0, 0, -10, yaw=0)
 
@@ -142,7 +142,7 @@ def test_the_battery_warns_then_holds_five_seconds_then_lands(pilot):
 
 def test_a_lost_ground_station_is_flagged_after_twelve_seconds(pilot):
     p = pilot().airborne()
-    p.firmware.gcs_heartbeat()
+    p.firmware.failsafes.gcs_heartbeat()
     assert p.until(lambda: bool(p.noted("datalink_lost")), 20) == pytest.approx(12, abs=0.1)
     assert p.firmware.mode is Mode.HOLD, "NAV_DLL_ACT is 0: nothing but the flag"
 
