@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 
 NEIGHBOURHOOD = 15  # px, what a dot is compared with; about half the spacing of the grid
 REACH = 5  # px, half the window of the centroid
-MOST = 420  # candidates kept, the strongest; the grid has 121 dots
+LIFT = 48  # grey levels added to the difference, so that noise below zero is not lost
+MOST = 300  # candidates kept, the strongest; the grid has 121 dots
 LARGEST_MOTION = 12.0  # px between laser-off and laser-on
 
 
@@ -67,15 +68,15 @@ def find_spots(off: Image, on: Image) -> Spots:
     """Spots that are in `on` and not in `off`, both (h, w) uint8 of working size; the strongest MOST of them."""
     motion = motion_between(off, on)
     still = shifted(off, motion) if motion.any() else off
-    difference = cv2.subtract(on, still)
+    difference = cv2.addWeighted(on, 1.0, still, -1.0, LIFT)
     if motion.any():
         margin = int(np.ceil(np.abs(motion).max())) + 1
         for border in (difference[:margin], difference[-margin:], difference[:, :margin], difference[:, -margin:]):
-            border[:] = 0
-    smooth = cv2.blur(difference, (3, 3))
+            border[:] = LIFT
+    smooth = cv2.blur(cv2.blur(difference, (3, 3)), (3, 3))
     response = cv2.subtract(smooth, cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
-    noise = float(np.mean(difference[::4, ::4])) + 0.3
-    peaks = _peaks(response, max(3.0, 2.0 * noise))
+    typical = float(np.mean(response[::4, ::4]))
+    peaks = _peaks(response, max(2.0, 6.5 * typical))
     return _centroids(on, still, peaks, motion)
 
 
@@ -109,21 +110,56 @@ def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -
     noise = 1.4826 * np.median(np.abs(around - base[:, None]), axis=1) + 0.25
     patch -= base[:, None, None]
     centre = np.zeros((len(peaks), 2))
-    for reach_px in (3.5, 3.0, 3.0):
+    for width_px in (2.4, 2.0, 2.0):
         distance2 = (du - centre[:, 0, None, None]) ** 2 + (dv - centre[:, 1, None, None]) ** 2
-        window = np.exp(-0.5 * distance2 / (reach_px / 1.8) ** 2)
-        weight = np.maximum(patch, 0) * window
+        weight = np.maximum(patch, 0) * np.exp(-0.5 * distance2 / width_px**2)
         total = weight.sum(axis=(1, 2)) + 1e-6
         offset = np.stack([(weight * du).sum(axis=(1, 2)), (weight * dv).sum(axis=(1, 2))], axis=1) / total[:, None]
         # a window on a spot of like width halves the offset: twice the step, kept within the patch
-        centre = np.clip(centre + 1.6 * (offset - centre), -2.5, 2.5)
-    level = (patch * window).sum(axis=(1, 2)) / window.sum(axis=(1, 2))
-    spread2 = (weight * distance2).sum(axis=(1, 2)) / total
-    sigma = np.hypot(0.04, 1.1 * noise * np.sqrt(spread2) / np.maximum(total, 1e-3) * 3.0)
-    keep = (level > 1.2 * noise / 2) & (level > 0.8)
+        centre = np.clip(centre + 1.7 * (offset - centre), -2.5, 2.5)
+    spread2 = 0.5 * (weight * distance2).sum(axis=(1, 2)) / total
+    spread2 = 1 / np.maximum(1 / np.maximum(spread2, 0.5) - 1 / width_px**2, 0.12)
+    strong = slice(0, max(12, len(peaks) // 4))
+    width2 = float(np.clip(np.median(spread2[strong]), 0.7, 6.0))
+    burnt = off[v, u] > 247
+    centre, level, sigma = _fitted(patch, ~burnt, du, dv, centre, width2, noise)
+    keep = (level > 0.8 * noise) & (level > 1.2) & (sigma < 0.8)
     uv = peaks + centre
     keep &= _first_of_each(uv, 4.0)
     return Spots(uv[keep], level[keep].astype(float), sigma[keep], motion)
+
+
+def _fitted(
+    patch: NDArray[np.float32],
+    usable: NDArray[np.bool_],
+    du: NDArray[np.int64],
+    dv: NDArray[np.int64],
+    centre: Array,
+    width2: float,
+    noise: Array,
+) -> tuple[Array, Array, Array]:
+    """Centre (n, 2), height and standard deviation of the centre of round Gaussian spots of variance `width2` px², by
+    Gauss and Newton from `centre`; pixels that are not `usable` (burnt out) do not count."""
+    level = np.zeros(len(patch))
+    for step in range(3):
+        x, y = du - centre[:, 0, None, None], dv - centre[:, 1, None, None]
+        distance2 = x * x + y * y
+        shape = np.exp(-0.5 * distance2 / width2)
+        use = usable * np.exp(-0.5 * distance2 / (2.5 * width2))
+        if step == 0:
+            level = (use * shape * patch).sum(axis=(1, 2)) / ((use * shape * shape).sum(axis=(1, 2)) + 1e-6)
+        gain = np.maximum(level, 1.0)[:, None, None] / width2
+        slopes = np.stack([shape, gain * x * shape, gain * y * shape], axis=1).reshape(len(patch), 3, -1)
+        weighted = slopes * use.reshape(len(patch), 1, -1)
+        normal = weighted @ slopes.transpose(0, 2, 1) + 1e-3 * np.eye(3)
+        residual = (patch - level[:, None, None] * shape).reshape(len(patch), -1, 1)
+        change = np.linalg.solve(normal, weighted @ residual)[..., 0]
+        level = level + change[:, 0]
+        centre = np.clip(centre + np.clip(change[:, 1:], -0.7, 0.7), -3.5, 3.5)
+    inverse = np.linalg.inv(normal)
+    spread = inverse @ (weighted @ weighted.transpose(0, 2, 1)) @ inverse
+    sigma = np.sqrt(0.5 * (spread[:, 1, 1] + spread[:, 2, 2])) * noise
+    return centre, level, np.hypot(sigma, 0.04)
 
 
 def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vision.camera import Camera
 from vision.capture import Image
 from vision.observation import FarView
-from vision.rotor_fit import Fit, Picture, fit_rotor
+from vision.rotor_fit import Fit, Picture, fit_rotor, settled, start_of
 from vision.rotor_model import surprise
 from vision.rotor_search import guesses
 
@@ -26,6 +26,7 @@ WORKING_PX = 800  # pictures wider than this are halved
 MODEL_HUB_PX = 1.0  # what equal straight edges leave out: foreshortening, twist, bend
 MODEL_DIRECTION = np.deg2rad(0.4)
 LEAST_SUPPORT = 0.5
+MOST_FITS = 3
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,9 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -
         image = np.asarray(cv2.resize(image, (small.width, small.height), interpolation=cv2.INTER_AREA), np.uint8)
     picture = _picture(image, small)
     near, within = (expected.hub / factor, 4 * expected.sigma_px / factor) if expected is not None else (None, np.inf)
-    fits = [fit_rotor(picture, guess) for guess in guesses(picture.planes, near, within)]
+    settled_on = [settled(picture, start_of(guess)) for guess in guesses(picture.planes, near, within)]
+    settled_on.sort(key=lambda found: -found[1])
+    fits = [fit_rotor(picture, *found) for found in settled_on[:MOST_FITS]]
     elapsed = {"far_view": (time.perf_counter() - started) * 1e3}
     if not fits:
         return FarView(False, ("no three equal blades around a hub",), elapsed_ms=elapsed)

@@ -16,8 +16,8 @@ from vision.rotor_search import Guess
 
 Array = NDArray[np.float64]
 
-SAMPLES = 90  # along each edge
-REACHES = (5.0, 4.0, 3.0)  # px across the expected edge in which it is looked for, round by round
+SAMPLES = 70  # along each edge
+REACHES = (5.0, 3.0)  # px across the expected edge in which it is looked for, round by round
 EDGE_PX = 1.0  # sigma of one edge point: what straight edges leave out, more than what the picture does
 NEIGHBOURS = 6.0  # points that err together
 AGREES_PX = 2.5
@@ -75,13 +75,16 @@ class Fit:
     agreement: float
 
 
-def fit_rotor(picture: Picture, guess: Guess) -> Fit:
-    """The guess moved to where the edges really are, with its support."""
+def start_of(guess: Guess) -> Array:
+    """Parameters (8,) of the rotor model for a first guess, seen straight from the front."""
     third = 2 * np.pi / 3
     turn = float(np.angle(np.exp(3j * guess.directions).sum()) / 3)
     turn += third * np.round((guess.directions[0] - turn) / third)
-    start = np.array([*guess.hub, turn, 0.0, TILT[0], guess.leading, guess.trailing, 1 / guess.length])
-    parameters, agreement = settled(picture, start)
+    return np.array([*guess.hub, turn, 0.0, TILT[0], guess.leading, guess.trailing, 1 / guess.length])
+
+
+def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
+    """Settled parameters (8,) moved to where the edges really are, with their support."""
     edges = edge_points(picture, parameters, REACHES[0])
     jacobian = np.zeros((0, len(SCALE)))
     for reach in REACHES:
@@ -89,7 +92,9 @@ def fit_rotor(picture: Picture, guess: Guess) -> Fit:
         if edges.real.sum() < 30:
             break
         arguments = (edges.only(edges.real), picture.camera)
-        solution = least_squares(_residuals, parameters, args=arguments, x_scale=SCALE, loss="soft_l1", f_scale=1.5)
+        solution = least_squares(
+            _residuals, parameters, args=arguments, x_scale=SCALE, loss="soft_l1", f_scale=1.5, max_nfev=8, xtol=1e-5
+        )
         parameters, jacobian = solution.x, solution.jac
     residual = EDGE_PX * _residuals(parameters, edges, picture.camera)[: len(edges.real)]
     agrees = edges.real & (np.abs(residual) < AGREES_PX)
@@ -116,7 +121,7 @@ def fit_rotor(picture: Picture, guess: Guess) -> Fit:
     )
 
 
-def settled(picture: Picture, start: Array, rounds: int = 5, tries: int = 400) -> tuple[Array, float]:
+def settled(picture: Picture, start: Array, rounds: int = 4, tries: int = 240) -> tuple[Array, float]:
     """The parameters (8,) near `start` whose six edges the picture agrees with most, and that agreement, 0 to 1.
 
     A cross-entropy search: any line of the background may be stronger than one edge of one blade, but nothing else agrees with
@@ -131,14 +136,14 @@ def settled(picture: Picture, start: Array, rounds: int = 5, tries: int = 400) -
         drawn = mean + spread * rng.standard_normal((tries, 8))
         drawn[0] = best
         value = agreement(picture, drawn) - 0.01 * (surprise(drawn) ** 2).sum(axis=1)
-        order = np.argsort(-value)[: tries // 12]
+        order = np.argsort(-value)[: tries // 10]
         if value[order[0]] > best_value:
             best, best_value = drawn[order[0]], float(value[order[0]])
         mean, spread = drawn[order].mean(axis=0), 1.1 * drawn[order].std(axis=0) + 1e-6
     return best, float(agreement(picture, best[None])[0])
 
 
-def agreement(picture: Picture, parameters: Array, samples: int = 40) -> Array:
+def agreement(picture: Picture, parameters: Array, samples: int = 30) -> Array:
     """(k,): share of the six edges' length, 0 to 1, on which the picture changes across them, for parameters (k, 8)."""
     edges = outline(parameters, np.linspace(0, 1, samples), picture.camera)
     half = picture.camera.centre - 2

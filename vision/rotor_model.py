@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import Camera
-from vision.capture import rotation_of
 
 Array = NDArray[np.float64]
 
@@ -48,9 +47,9 @@ def outline(parameters: Array, shares: Array, camera: Camera) -> Outline:
         along, across = blade_axes(parameters[:, 2] + b * 2 * np.pi / 3, axes)
         for s, root in enumerate((leading, -trailing)):
             w = root[:, None] * (1 - taper[:, None] * r)
-            p = hub[:, None] + (r[..., None] * along[:, None] + w[..., None] * across[:, None]) / lengths
-            points[:, b, s, :, 0] = camera.fx * p[..., 1] / p[..., 0]
-            points[:, b, s, :, 1] = camera.fy * p[..., 2] / p[..., 0]
+            px, py, pz = (hub[:, k, None] + (r * along[:, k, None] + w * across[:, k, None]) / lengths for k in range(3))
+            points[:, b, s, :, 0] = camera.fx * py / px
+            points[:, b, s, :, 1] = camera.fy * pz / px
     points += np.array([camera.cx, camera.cy]) - camera.centre
     step = points[..., -1, :] - points[..., 0, :]
     return Outline(points, step / np.linalg.norm(step, axis=-1, keepdims=True))
@@ -64,7 +63,11 @@ def place(parameters: Array, camera: Camera) -> tuple[Array, float]:
 
 def rotor_axes(parameters: Array) -> Array:
     """(k, 3, 3): columns are the rotor's axes in the camera frame."""
-    return np.stack([rotation_of(0.0, -tilt, yaw) for yaw, tilt in parameters[:, 3:5]])
+    cy, sy = np.cos(parameters[:, 3]), np.sin(parameters[:, 3])
+    cp, sp = np.cos(parameters[:, 4]), -np.sin(parameters[:, 4])
+    zero = np.zeros_like(cy)
+    rows = [[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, zero, cp]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def blade_axes(turn: Array, axes: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ SPACING = np.deg2rad(9.0)  # how far from 120° perspective may bring two blades
 CLOSING = np.deg2rad(1.0), np.deg2rad(15.0)  # by which angle the edges of a blade approach each other
 LEADING_SHARE = 0.31  # of a blade's width lies before its axis: blades turn about their front third
 LENGTH = 0.2, 3.0  # of the image's diagonal, from the hub to where the edges would meet
-MOST_TRIED = 300
+MOST_TRIED = 150
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _blades(lines: Array, votes: Array) -> _Blades:
     return _Blades(axis % (2 * np.pi), offset, apex, closing, strength[one] + strength[other])
 
 
-def guesses(planes: Array, near: Array | None, within_px: float, most: int = 8) -> list[Guess]:
+def guesses(planes: Array, near: Array | None, within_px: float, most: int = 6) -> list[Guess]:
     """First guesses of the rotor, the best first. near (2,): where the hub is expected in the image frame, within so much.
 
     Two blades 120° apart that have one length and one width at the point where their axes cross make a rotor; lines where

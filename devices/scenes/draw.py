@@ -20,6 +20,9 @@ Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
 
+BRIGHTEST = 238.0  # of 255: an exposed blade is not burnt out, or no laser could be seen on it
+
+
 @dataclass(frozen=True)
 class Scene:
     """Images, the rig that took them, and the truth."""
@@ -87,6 +90,7 @@ def _draw_eye(
     level *= 1 + 0.35 * settings.dirt * sample(dirt, s / 3, n / 3)
     if settings.glare:
         level += 255 * settings.glare * np.exp(-((slope - 0.1) ** 2) / 0.01)
+    level = np.minimum(level, BRIGHTEST)
     tint = np.float32([0.98, 1.0, 1.01])
     image = background.colour(y, z, eye_y)
     image += (level[..., None] * tint - image) * inside[..., None]
@@ -137,12 +141,16 @@ def _expose(settings: SceneSettings, light: Array, rng: np.random.Generator) -> 
     scale = settings.scale
     image = cv2.GaussianBlur(light, (0, 0), settings.blur_px * scale)
     if settings.motion_blur_px > 1:
-        length = int(round(settings.motion_blur_px * scale)) | 1
-        kernel = np.zeros((length, length), np.float32)
         way = settings.seed % 7 / 7 * np.pi
-        middle = length // 2
-        tip = (round(middle + middle * np.cos(way)), round(middle + middle * np.sin(way)))
-        cv2.line(kernel, (2 * middle - tip[0], 2 * middle - tip[1]), tip, 1.0)
+        reach = settings.motion_blur_px * scale / 2
+        size = int(np.ceil(reach)) * 2 + 3
+        kernel = np.zeros((size, size), np.float32)
+        for share in np.linspace(-reach, reach, 8 * size + 1):
+            spot = np.eye(2, 3, dtype=np.float32)
+            spot[:, 2] = share * np.cos(way), share * np.sin(way)
+            dot = np.zeros((size, size), np.float32)
+            dot[size // 2, size // 2] = 1
+            kernel += cv2.warpAffine(dot, spot, (size, size))
         image = cv2.filter2D(image, -1, kernel / kernel.sum())
     if not settings.colour:
         image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
