@@ -19,8 +19,9 @@ from mission.executive.stage import FlightError, Stage, lockstep_stage, wall_sta
 if TYPE_CHECKING:
     from flight.turbine import Turbine
     from mission.executive.decision import Autonomy
-    from mission.executive.executive import Ask, Executive, Question
+    from mission.executive.executive import Executive
     from mission.executive.journal import Journal
+    from mission.executive.question import Ask, Question
     from mission.language.document import Mission
     from mission.record.folder import RunFolder
     from mission.record.recorder import RunRecorder

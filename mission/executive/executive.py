@@ -7,19 +7,20 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from flight.autopilot import Setpoint
 from mission.behaviours.behaviour import behaviours
 from mission.executive import snapshot as snapshots
+from mission.executive.chronicle import Chronicle
 from mission.executive.decision import Autonomy, autonomy_after, decide
 from mission.executive.events import EVENTS, event
 from mission.executive.gate import Gate, guard_services
-from mission.executive.journal import FORMAT, Journal
+from mission.executive.helm import PULSE_S, Helm
+from mission.executive.journal import Journal
 from mission.executive.machine import Machine, entries
+from mission.executive.question import Ask, Question, Questions
 from mission.executive.queue import EventQueue, Queued
 from mission.executive.resume import take_up
 from mission.executive.snapshot import Snapshot
@@ -29,14 +30,12 @@ from mission.executive.watch import Watcher
 from mission.executive.work import Work
 from mission.language import semantics
 from mission.language.document import Mission, Transition
-from mission.language.semantics import Configuration
+from mission.language.semantics import Configuration, Quantities
 
 if TYPE_CHECKING:
     from mission.executive.clock import Clock
     from mission.executive.services import Services
 
-PULSE_S = 0.1  # of the event loop: the executive shows at least this often that it is alive
-STALLED_S = 0.8  # of the event loop: after such a gap the autopilot may have left OFFBOARD
 KEEP_S = 2.0  # how often the journal is told what a behaviour has found out and how far it has come
 _MOST_FAULTS = 3
 
@@ -48,23 +47,6 @@ class Outcome:
     outcome: str
     final_state: str
     interrupted: bool = False
-
-
-@dataclass(frozen=True)
-class Question:
-    """What an operator is asked before a transition. `text` is one line."""
-
-    event: str
-    source: str
-    target: str
-
-    @property
-    def text(self) -> str:
-        """The question as it is shown."""
-        return f"{self.source}: {self.event} → {self.target}?"
-
-
-Ask = Callable[[Question], Awaitable[bool]]
 
 
 class Executive:
@@ -87,28 +69,25 @@ class Executive:
     ) -> None:
         self.mission, self.services, self.autonomy = mission, services, autonomy
         self.interrupted = False
-        self._clock, self._journal, self._ask = clock, journal, ask
-        self._resumed = resume is not None
-        self._autopilot, self._setpoints, self._perception = services.autopilot, services.setpoints, services.perception
+        self._clock, self._resumed = clock, resume is not None
+        self._autopilot = services.autopilot
         self._gate = Gate()
+        self._queue = EventQueue()
+        self._helm = Helm(services, self._gate, lambda gap_s: self.raise_event("setpoints_stalled", gap_s=gap_s))
         guard_services(services, self._gate)
         self._machine = Machine(mission, resume)
-        self._queue = EventQueue()
         self._work = Work(services, self._gate, self._behaviour_ended)
         self._watcher = Watcher(self._snapshot, self.raise_event, services.log, airborne=self._resumed)
+        self._chronicle = Chronicle(journal, clock, mission, services)
+        self._questions = Questions(ask, self._answered)
         self._timing = Timing()
         self._recent: deque[Recent] = deque(maxlen=8)
-        self._pending: Queued | None = None
         self._ignored: set[str] = set()
-        self._remembered: dict[str, Any] = {}
-        self._station_m: float | None = None
         self._paused = False
         self._ended: str | None = None
         self._faults = 0
-        self._alive_s = 0.0
         self._kept_s = 0.0
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._asking: set[asyncio.Task[None]] = set()
         journal.on_lost = self._journal_lost
 
     # What others call
@@ -121,37 +100,27 @@ class Executive:
     async def run(self) -> Outcome:
         """Fly until a final state is reached."""
         self._loop = asyncio.get_running_loop()
-        self._alive_s = self._loop.time()
         watching = self._loop.create_task(self._watcher.run(self._clock), name="monitors")
+        configuration = self._machine.configuration
         try:
-            self._journal.append(
-                "start",
-                self._clock.now(),
-                mission=self.mission.name,
-                version=self.mission.version,
-                format=FORMAT,
-                autonomy=self.autonomy,
-                resumed=self._resumed,
-                state=self._machine.state,
-                history=self._machine.configuration.history,
-                taken=self._machine.configuration.taken,
-            )
-            now = self._clock.now()
-            self._timing = self._timing.entering(self.mission, tuple(reversed(self._machine.configuration.active)), now)
+            self._chronicle.begins(configuration, autonomy=self.autonomy, resumed=self._resumed)
+            entered = tuple(reversed(configuration.active))
+            self._timing = self._timing.entering(self.mission, entered, self._clock.now())
             try:
                 if self._resumed:
-                    await self._patiently(take_up(self.services, self.mission, self._machine.configuration))
+                    await self._helm.patiently(take_up(self.services, self.mission, configuration))
                 await self._begin()
             except Exception as error:
                 await self._fault(error)
             while self._ended is None:
                 await self._turn()
-            await self._finish()
-            return Outcome(self._ended, self._machine.state, self.interrupted)
+            await self._helm.leave()
+            self._chronicle.ends(self._ended, self.state)
+            await self._helm.patiently(self._chronicle.journal.durable())
+            return Outcome(self._ended, self.state, self.interrupted)
         finally:
+            self._questions.close()
             watching.cancel()
-            for task in self._asking:
-                task.cancel()
             with suppress(asyncio.CancelledError):
                 await watching
 
@@ -163,7 +132,7 @@ class Executive:
         """
         entry = event(name)
         if entry.lets_go:
-            self._let_go()
+            self._helm.let_go()
         if entry.raised_by == "operator" and "by" in data:
             self.note(name, str(data["by"]), **{key: value for key, value in data.items() if key != "by"})
         self._queue.put(name, data)
@@ -172,7 +141,8 @@ class Executive:
         """The same from any thread."""
         event(name)
         if self._loop is not None:
-            self._loop.call_soon_threadsafe(lambda: self.raise_event(name, **data))
+            with suppress(RuntimeError):  # the loop has ended: there is nothing left to tell it
+                self._loop.call_soon_threadsafe(lambda: self.raise_event(name, **data))
 
     def interrupt(self, by: str = "") -> None:
         """Ctrl-C, SIGTERM: run the abort path, and say so in the outcome."""
@@ -181,67 +151,65 @@ class Executive:
 
     def confirm(self, yes: bool) -> str:
         """Answer the question that waits; returns what becomes of it, for the operator to read."""
-        pending, self._pending = self._pending, None
+        pending = self._questions.take()
         if pending is None:
             return "nothing waits for an answer"
         if not yes:
-            return f"{pending.name} is not followed; the vehicle holds in {self._machine.state}"
+            return f"{pending.name} is not followed; the vehicle holds in {self.state}"
         about = {"activation": pending.activation, "origin": pending.origin, "only": pending.only}
         self._queue.put(pending.name, pending.data, confirmed=True, **about)
         return f"{pending.name} is followed"
 
-    def skip(self, path: str) -> str:
-        """Go to a state that the mission marks as an entry; returns what becomes of it."""
+    def skip(self, path: str) -> tuple[bool, str]:
+        """Go to a state that the mission marks as an entry; returns whether, and the words for the operator."""
         known = entries(self.mission)
         if path not in known:
-            names = ", ".join(known) or "none"
-            return f"{path} is not an entry of this mission; entries: {names}"
+            return False, f"{path} is not an entry of this mission; entries: {', '.join(known) or 'none'}"
         leaf = self.mission.states[self.mission.leaf(path)]
         flies = behaviours()[leaf.do].airborne if leaf.do else None
-        in_air = self._autopilot.telemetry.in_air
-        if flies is not None and flies != in_air:
-            return f"{path} is for a vehicle {'in the air' if flies else 'on the ground'}"
+        if flies is not None and flies != self._autopilot.telemetry.in_air:
+            return False, f"{path} is for a vehicle {'in the air' if flies else 'on the ground'}"
         self._queue.put("skip", {"to": path}, only=known[path], confirmed=True)
-        return f"going to {path}"
+        return True, f"going to {path}"
 
     def answers(self, name: str) -> bool:
         """Whether the event would lead anywhere now."""
         return self._machine.choose(name, self._quantities()) is not None
 
+    def note(self, command: str, who: str, **about: Any) -> None:
+        """Write an operator's act to the journal."""
+        self._chronicle.acts(command, who, **about)
+
     def status(self) -> Status:
         """One glance at the run."""
-        now, active = self._clock.now(), self._machine.configuration.active
-        deadlines = [self._timing.deadlines[path] for path in active if path in self._timing.deadlines]
-        configuration, quantities = self._machine.configuration, self._quantities()
+        now, configuration = self._clock.now(), self._machine.configuration
+        deadlines = [due for path, due in self._timing.deadlines.items() if path in configuration.active]
+        question, behaviour, progress = self._questions.waiting, self._work.behaviour, self.services.progress
         return Status(
             mission=self.mission.name,
-            path=self._machine.state,
+            path=configuration.leaf,
             now_s=now,
-            entered_s=self._timing.entered_s.get(self._machine.state, now),
+            entered_s=self._timing.entered_s.get(configuration.leaf, now),
             deadline_s=min(deadlines, default=None),
-            behaviour=self._work.behaviour.name if self._work.behaviour else None,
-            next=possible(self.mission, configuration, self._timing, quantities),
+            behaviour=None if behaviour is None else behaviour.name,
+            next=possible(self.mission, configuration, self._timing, self._quantities()),
             recent=tuple(self._recent),
             autonomy=self.autonomy,
             paused=self._paused,
-            waiting=None if self._pending is None else self._question(self._pending).text,
+            waiting=None if question is None else question.text,
             let_go=self._gate.let_go,
             interrupted=self.interrupted,
-            journal_error=self._journal.error,
+            journal_error=self._chronicle.journal.error,
             ended=self._ended,
-            text=self.services.progress.text,
-            station_m=self.services.progress.station_m,
+            text=progress.text,
+            station_m=progress.station_m,
         )
-
-    def note(self, command: str, who: str, **about: Any) -> None:
-        """Write an operator's act to the journal."""
-        self._journal.append("operator", self._clock.now(), command=command, who=who, **about)
 
     # The loop
 
     async def _turn(self) -> None:
         """Handle one event, or wait for one until something is due."""
-        self._alive()
+        self._helm.beat()
         try:
             await self._act_on_time()
             queued = self._queue.pop()
@@ -250,11 +218,7 @@ class Executive:
                 return
         except Exception as error:
             await self._fault(error)
-        await self._wait()
-
-    async def _wait(self) -> None:
-        due_s = self._timing.next_s()
-        patience = PULSE_S
+        due_s, patience = self._timing.next_s(), PULSE_S
         if due_s is not None:
             patience = min(patience, max((due_s - self._clock.now()) / self._clock.speed, 0.0))
         with suppress(TimeoutError):
@@ -266,14 +230,14 @@ class Executive:
         now = self._clock.now()
         if now - self._kept_s >= KEEP_S and not len(self._queue):
             self._kept_s = now
-            self._journal_memory(now)
+            self._chronicle.found_out(self.state)
         late = self._timing.overdue(now)
         if late is not None:
             self._timing = self._timing.expired(late)
-            if self._pending is None:
+            if self._questions.waiting is None:
                 self._queue.put("timed_out", {"state": late}, origin=late)
                 await self._stop()
-                self._hold()
+                self._helm.hold()
         ripe = self._timing.due(now)
         if ripe is not None:
             self._timing = self._timing.without(ripe)
@@ -281,52 +245,41 @@ class Executive:
 
     async def _handle(self, queued: Queued) -> None:
         if queued.activation is not None and queued.activation != self._work.activation:
-            self._journal_event(queued, "stale", {})
+            self._chronicle.happened(queued, "stale", self.state, {})
             return
-        if queued.name == "step" and self._pending is not None:
-            self._journal_event(queued, "confirmation", {})
+        if queued.name == "step" and self._questions.waiting is not None:
+            self._chronicle.happened(queued, "confirmation", self.state, {})
             self.confirm(True)
             return
         quantities = self._quantities()
         decision = decide(self.mission, self._machine.configuration, queued, quantities, self.autonomy)
-        self._journal_event(queued, decision.led_to, quantities)
+        self._chronicle.happened(queued, decision.led_to, self.state, quantities)
         transition = decision.transition
         if decision.led_to == "ignored":
             self._unanswered(queued)
         elif transition is None:
             return
         elif decision.led_to == "delayed":
-            waiting = Waiting(self._clock.now() + decision.delay_s, queued.name, transition)
-            self._timing = self._timing.delaying(waiting)
+            due_s = self._clock.now() + decision.delay_s
+            self._timing = self._timing.delaying(Waiting(due_s, queued.name, transition))
         elif decision.led_to == "asked":
-            self._pending = replace(queued, only=transition)
-            self._put_question(self._pending)
+            target = semantics.entered_leaf(self.mission, self._machine.configuration, transition)
+            self._questions.put(replace(queued, only=transition), Question(queued.name, self.state, target))
         else:
             await self._go(queued, transition, quantities)
 
-    async def _go(self, queued: Queued, transition: Transition, quantities: semantics.Quantities) -> None:
+    async def _go(self, queued: Queued, transition: Transition, quantities: Quantities) -> None:
         """One transition: stop, journal, move, start."""
         if event(transition.event).lets_go:
-            self._let_go()
+            self._helm.let_go()
         await self._stop()
         step = semantics.take(self.mission, self._machine.configuration, transition, queued.name)
-        now = self._clock.now()
-        self._journal.append(
-            "transition",
-            now,
-            event=queued.name,
-            by=transition.event,
-            key=transition.key,
-            **{"from": step.source, "to": step.after.leaf},
-            history=step.after.history,
-            taken=step.after.taken,
-            **({} if (memory := self._news()) is None else {"memory": memory}),
-        )
-        await self._patiently(self._journal.durable())
+        self._chronicle.steps(step)
+        await self._helm.patiently(self._chronicle.journal.durable())
         await self._machine.take(queued.name, quantities, queued.origin, transition)
         now = self._clock.now()
         self._timing = self._timing.stepping(self.mission, step, now)
-        self._pending = None
+        self._questions.take()
         self._paused = transition.event == "paused"
         self.autonomy = autonomy_after(transition, self.autonomy)
         for name in self._ignored:
@@ -340,42 +293,34 @@ class Executive:
 
     async def _begin(self) -> None:
         """Start what the active leaf does; without a behaviour, hold."""
-        state = self.mission.states[self._machine.state]
+        state = self.mission.states[self.state]
         self.services.progress.text, self.services.progress.station_m = "", None
         if state.final is not None:
             self._ended = state.final
         elif state.do is None:
-            self._hold()
+            self._helm.hold()
         else:
             self._work.start(behaviours()[state.do], state.parameters)
 
     async def _stop(self) -> None:
-        if not await self._work.stop(self._alive):
-            self._hold()
-            self._queue.put("behaviour_stuck", {"state": self._machine.state})
+        if not await self._work.stop(self._helm.beat):
+            self._helm.hold()
+            self._queue.put("behaviour_stuck", {"state": self.state})
 
-    async def _finish(self) -> None:
-        """The last lines. A vehicle that is still in the air, and ours, is left in the autopilot's own hold."""
-        if not self._gate.let_go:
-            with suppress(Exception):
-                if self._autopilot.telemetry.in_air:
-                    await self._patiently(self._autopilot.hold())
-            self._setpoints.stop()
-        self._journal_memory(self._clock.now())
-        lost = {"lost": self._journal.lost} if self._journal.lost else {}
-        self._journal.append("end", self._clock.now(), outcome=self._ended, state=self._machine.state, **lost)
-        await self._patiently(self._journal.durable())
-
-    # What the loop is made of
+    # What happens to it
 
     def _behaviour_ended(self, activation: int, name: str, data: dict[str, Any]) -> None:
         self._queue.put(name, data, activation=activation)
+
+    def _answered(self, yes: bool) -> None:
+        self.note("confirm" if yes else "refuse", "operator")
+        self.confirm(yes)
 
     def _unanswered(self, queued: Queued) -> None:
         """Nobody answers. A limit is watched again in the next state; a behaviour's last word must not be lost."""
         self._ignored.add(queued.name)
         self._recent.append(Recent(self._clock.now(), queued.name, "ignored"))
-        self.services.log.warning("event without answer", name=queued.name, state=self._machine.state)
+        self.services.log.warning("event without answer", name=queued.name, state=self.state)
         telemetry = self._autopilot.telemetry
         if event(queued.name).lets_go:
             self._ended = "released"
@@ -384,116 +329,25 @@ class Executive:
         elif queued.activation is not None and queued.name not in EVENTS:
             self._queue.put("behaviour_failed", {"error": f"nothing answers its outcome {queued.name!r}"})
 
-    def _put_question(self, pending: Queued) -> None:
-        if self._ask is None or self._loop is None:
-            return
-        ask = self._ask
-
-        async def put() -> None:
-            yes = await ask(self._question(pending))
-            if self._pending is pending:
-                self.note("confirm" if yes else "refuse", "operator", event=pending.name)
-                self.confirm(yes)
-
-        task = self._loop.create_task(put(), name="question")
-        self._asking.add(task)
-        task.add_done_callback(self._asking.discard)
-
-    def _question(self, pending: Queued) -> Question:
-        assert pending.only is not None
-        target = semantics.entered_leaf(self.mission, self._machine.configuration, pending.only)
-        return Question(pending.name, self._machine.state, target)
-
-    def _hold(self) -> None:
-        """Stay here, if setpoints are being sent at all."""
-        if self._gate.let_go or self._setpoints.target is None:
-            return
-        pose = self._autopilot.telemetry.pose
-        self._setpoints.target = Setpoint(pose.position.copy(), float(pose.attitude[2]))
-
-    def _let_go(self) -> None:
-        """Somebody else flies: no setpoint and no command from now on, and no laser."""
-        if self._gate.let_go:
-            return
-        self._gate.let_go = True
-        self._setpoints.stop()
-        with suppress(Exception):
-            self._perception.watch_blade(False)
-        self.services.log.warning("let go of the vehicle")
-
-    def _alive(self) -> None:
-        """Say that the executive is alive; notice if it was not."""
-        now = asyncio.get_running_loop().time()
-        gap, self._alive_s = now - self._alive_s, now
-        if gap > STALLED_S and self._setpoints.target is not None:
-            self._queue.put("setpoints_stalled", {"gap_s": round(gap, 2)})
-        stroke = getattr(self._setpoints, "stroke", None)
-        if stroke is not None:
-            stroke()
-
-    async def _patiently(self, awaitable: Awaitable[Any]) -> None:
-        """Wait without appearing dead."""
-        task = asyncio.ensure_future(awaitable)
-        while not task.done():
-            self._alive()
-            await asyncio.wait([task], timeout=PULSE_S)
-        task.result()
+    def _journal_lost(self, text: str) -> None:
+        self.services.log.error("journal lost", text=text)
+        self.raise_event_threadsafe("journal_lost", error=text)
 
     async def _fault(self, error: Exception) -> None:
         """An error of the executive itself: abort, and if that does not help either, leave the vehicle holding."""
         self._faults += 1
-        self.services.log.exception("executive failed", state=self._machine.state)
-        self._journal.append("fault", self._clock.now(), error=f"{type(error).__name__}: {error}"[:300])
+        self.services.log.exception("executive failed", state=self.state)
+        self._chronicle.fails(error)
         if self._faults >= _MOST_FAULTS:
             await self._stop()
             self._ended = "aborted"
         else:
             self._queue.put("abort", {"error": type(error).__name__})
 
-    def _journal_lost(self, text: str) -> None:
-        self.services.log.error("journal lost", text=text)
-        self.raise_event_threadsafe("journal_lost", error=text)
-
-    def _journal_event(self, queued: Queued, led_to: str, quantities: Mapping[str, float | bool | None]) -> None:
-        guards = {
-            name: quantities.get(name)
-            for transition in self.mission.handlers(queued.origin or self._machine.state, queued.name)
-            for condition in (transition.when, transition.unless)
-            if condition is not None
-            for name in condition.names
-        }
-        only = queued.only.key if queued.only else None
-        about = {"origin": queued.origin, "only": only, "confirmed": queued.confirmed or None}
-        self._journal.append(
-            "event",
-            self._clock.now(),
-            event=queued.name,
-            state=self._machine.state,
-            led_to=led_to,
-            **{name: value for name, value in about.items() if value is not None},
-            **({"data": queued.data} if queued.data else {}),
-            **({"guards": guards} if guards else {}),
-        )
-
-    def _journal_memory(self, now: float) -> None:
-        memory = self._news()
-        if memory is not None:
-            self._journal.append("memory", now, **memory)
-        station = self.services.progress.station_m
-        if station is not None and round(station, 1) != self._station_m:
-            self._station_m = round(station, 1)
-            self._journal.append("progress", now, state=self._machine.state, station_m=self._station_m)
-
-    def _news(self) -> dict[str, Any] | None:
-        """What the journal has not been told yet of what was found out."""
-        memory = asdict(self.services.memory)
-        if memory == self._remembered:
-            return None
-        self._remembered = memory
-        return memory
+    # What it sees
 
     def _snapshot(self, was_ours: bool = True) -> Snapshot:
-        state = self.mission.states[self._machine.state]
+        state = self.mission.states[self.state]
         behaviour = self._work.behaviour
         keeps = behaviour is not None and behaviour.keeps_standoff
         return snapshots.take(

@@ -50,7 +50,7 @@ class Journal:
         self.on_lost: Callable[[str], None] | None = None
         self._seq = seq
         self._sync = sync
-        self._file = None if path is None else _opened(path)
+        self._file = None if path is None else _opened(path, sync)
         self._writer = ThreadPoolExecutor(1, "journal") if threaded and path is not None else None
         self._last: Future[None] | None = None
 
@@ -152,9 +152,11 @@ def reopen(path: Path, *, threaded: bool = False) -> tuple[Journal, tuple[Entry,
     return Journal(path, threaded=threaded, seq=len(entries)), entries
 
 
-def _opened(path: Path) -> Any:
+def _opened(path: Path, sync: bool) -> Any:
     try:
         file = path.open("ab")
+        if not sync:
+            return file
         folder = os.open(path.parent, os.O_RDONLY)
         try:
             os.fsync(folder)

@@ -132,8 +132,7 @@ def _step(executive: Executive, request: Mapping[str, Any], about: dict[str, Any
 def _skip(executive: Executive, request: Mapping[str, Any], about: dict[str, Any]) -> tuple[bool, str]:
     target = str(request.get("target", ""))
     executive.note("skip", about["by"], at=about["at"], target=target)
-    text = executive.skip(target)
-    return text.startswith("going"), text
+    return executive.skip(target)
 
 
 def _status(executive: Executive, request: Mapping[str, Any], about: dict[str, Any]) -> tuple[bool, str]:

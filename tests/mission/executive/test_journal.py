@@ -124,7 +124,12 @@ def test_a_full_disk_brings_the_vehicle_home(fly: Any) -> None:
             "aborted": {"final": "aborted"},
         },
         at=[
-            (1.0, lambda executive: setattr(executive._journal, "_file", FullDisk(executive._journal._file))),
+            (
+                1.0,
+                lambda executive: setattr(
+                    executive._chronicle.journal, "_file", FullDisk(executive._chronicle.journal._file)
+                ),
+            ),
             (2.0, lambda executive: executive.raise_event("step")),
             (3.0, lambda executive: executive.raise_event("step")),
         ],

@@ -80,7 +80,7 @@ happenings = st.lists(
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(missions(), happenings)
 def test_library_and_rules_agree_on_any_sequence_of_events(mission: Mission, happening: list[Any]) -> None:
     async def walk() -> None:
@@ -100,7 +100,7 @@ def test_library_and_rules_agree_on_any_sequence_of_events(mission: Mission, hap
     asyncio.run(walk())
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(missions(), st.data())
 def test_a_named_transition_is_taken_and_no_other(mission: Mission, data: st.DataObject) -> None:
     async def walk() -> None:

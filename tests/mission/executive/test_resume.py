@@ -89,7 +89,7 @@ def test_a_pass_that_was_done_is_not_flown_again(fly: Any) -> None:
     assert after.services.memory.passes_done == ["leading", "trailing"]
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seconds=st.floats(0.05, 10.9), cut=st.integers(0, 120))
 def test_whenever_it_is_killed_and_wherever_the_last_line_is_torn_it_goes_on(
     fly: Any, tmp_path: Path, seconds: float, cut: int

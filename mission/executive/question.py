@@ -1,0 +1,67 @@
+"""Asking an operator before a transition is taken, and keeping the question until it is answered."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from mission.executive.queue import Queued
+
+
+@dataclass(frozen=True)
+class Question:
+    """What an operator is asked before a transition. `text` is one line."""
+
+    event: str
+    source: str
+    target: str
+
+    @property
+    def text(self) -> str:
+        """The question as it is shown."""
+        return f"{self.source}: {self.event} → {self.target}?"
+
+
+Ask = Callable[[Question], Awaitable[bool]]
+
+
+class Questions:
+    """At most one question waits. `answered(yes)` is told what the asked operator says, unless the question is past."""
+
+    def __init__(self, ask: Ask | None, answered: Callable[[bool], None]) -> None:
+        self._ask, self._answered = ask, answered
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._waiting: tuple[Queued, Question] | None = None
+
+    @property
+    def waiting(self) -> Question | None:
+        """The question that has no answer yet."""
+        return None if self._waiting is None else self._waiting[1]
+
+    def put(self, queued: Queued, question: Question) -> None:
+        """Ask whether an event may be followed. A question that still waits is past."""
+        waiting = self._waiting = (queued, question)
+        if self._ask is None:
+            return
+        ask = self._ask
+
+        async def wait_for_answer() -> None:
+            yes = await ask(question)
+            if self._waiting is waiting:
+                self._answered(yes)
+
+        task = asyncio.get_running_loop().create_task(wait_for_answer(), name="question")
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def take(self) -> Queued | None:
+        """The event that waits for an answer; from now on it waits no more."""
+        waiting, self._waiting = self._waiting, None
+        return None if waiting is None else waiting[0]
+
+    def close(self) -> None:
+        """Nobody needs to answer any more."""
+        self._waiting = None
+        for task in self._tasks:
+            task.cancel()
