@@ -15,7 +15,7 @@ from devices.world.turbine import TurbineShape
 from vision.capture import rotation_of
 
 if TYPE_CHECKING:
-    from devices.world.view import Renderer
+    from devices.world.renderer import Renderer
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class World:
     @cached_property
     def renderer(self) -> Renderer:
         """Draws the images; made when first asked for (a second or two)."""
-        from devices.world.view import Renderer
+        from devices.world.renderer import Renderer
 
         return Renderer(self.shape, self.settings)
 

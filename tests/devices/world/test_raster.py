@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation
 
+from devices.world.renderer import Renderer
 from devices.world.settings import WorldSettings
+from devices.world.true_view import true_view
 from devices.world.turbine import TurbineShape
-from devices.world.view import Renderer
 from vision.camera import Camera, RigGeometry, StereoPair
 from vision.capture import CameraPose, rotation_of
 
@@ -41,7 +42,7 @@ def test_silhouette_lies_within_a_pixel_and_depth_within_a_millimetre_of_ray_cas
         shape.blade_frame().to_ned(np.array([station, sideways, -distance])),
         rotation_of(0.0, np.deg2rad(pitch), heading),
     )
-    view = Renderer(shape, settings).truth(GEOMETRY, pose)
+    view = true_view(Renderer(shape, settings), GEOMETRY, pose)
 
     mesh = shape.mesh
     caster = trimesh.ray.ray_pyembree.RayMeshIntersector(trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False))

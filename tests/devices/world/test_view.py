@@ -4,9 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
+from devices.world.lens import right_pose
+from devices.world.motion import moved, smeared
+from devices.world.renderer import Renderer
 from devices.world.settings import WorldSettings
+from devices.world.true_view import true_view
 from devices.world.turbine import HUB, INSPECTED, SKY, TOWER, TurbineShape
-from devices.world.view import Renderer, draw, moved, right_pose, smeared
+from devices.world.view import draw
 from vision.camera import Camera, LaserGrid, RigGeometry, StereoPair
 from vision.capture import CameraPose, rotation_of
 
@@ -35,7 +39,7 @@ def renderer(shape) -> Renderer:
 
 def test_spots_are_green_and_lie_where_the_world_says(renderer, shape):
     pose = before(shape, 20.0, 3.0)
-    frames, truth = draw(renderer, pair(CAMERA), pose), renderer.truth(pair(CAMERA), pose)
+    frames, truth = draw(renderer, pair(CAMERA), pose), true_view(renderer, pair(CAMERA), pose)
     assert len(truth.dots_left) > 80
     for off, on, dots in (
         (frames.left, frames.left_laser, truth.dots_left),
@@ -56,7 +60,7 @@ def test_spots_are_green_and_lie_where_the_world_says(renderer, shape):
 
 def test_true_spots_satisfy_stereo_and_the_lasers_rays(renderer, shape):
     geometry, pose = pair(CAMERA), before(shape, 12.0, 4.0)
-    truth = renderer.truth(geometry, pose)
+    truth = true_view(renderer, geometry, pose)
     left = {
         (r, c): uv for r, c, uv in zip(truth.dots_left.row, truth.dots_left.column, truth.dots_left.uv, strict=True)
     }
@@ -76,7 +80,7 @@ def test_true_spots_satisfy_stereo_and_the_lasers_rays(renderer, shape):
 def test_spots_on_the_tower_behind_a_blade_are_told_apart():
     shape = TurbineShape(azimuth_deg=180.0)
     renderer = Renderer(shape, WorldSettings())
-    truth = renderer.truth(pair(CAMERA), before(shape, 36.0, 3.0, sideways=0.5))
+    truth = true_view(renderer, pair(CAMERA), before(shape, 36.0, 3.0, sideways=0.5))
     assert {INSPECTED, TOWER} <= set(truth.spot_part.tolist())
     for (u, v), part in zip(truth.dots_left.uv, truth.spot_part, strict=True):
         around = truth.part[round(v) - 1 : round(v) + 2, round(u) - 1 : round(u) + 2]
@@ -85,7 +89,7 @@ def test_spots_on_the_tower_behind_a_blade_are_told_apart():
 
 @pytest.mark.parametrize("station", [4.0, 12.0, 37.5])
 def test_edges_and_tip_lie_on_the_silhouette(renderer, shape, station):
-    truth = renderer.truth(pair(CAMERA), before(shape, station, 6.0))
+    truth = true_view(renderer, pair(CAMERA), before(shape, station, 6.0))
     blade = (truth.part == INSPECTED).astype(np.uint8)
     outline = blade - cv2.erode(blade, np.ones((3, 3), np.uint8))
     away = cv2.distanceTransform(1 - outline, cv2.DIST_L2, 5)
@@ -96,7 +100,7 @@ def test_edges_and_tip_lie_on_the_silhouette(renderer, shape, station):
 
 
 def test_from_afar_the_hub_and_the_three_blades_lie_where_the_world_says(renderer, shape):
-    truth = renderer.truth(pair(CAMERA), before(shape, 0.0, 45.0))
+    truth = true_view(renderer, pair(CAMERA), before(shape, 0.0, 45.0))
     assert truth.part[round(truth.hub[1]), round(truth.hub[0])] == HUB
     for number, angle in enumerate(truth.azimuths):
         u, v = truth.hub + 120.0 * np.array([np.cos(angle), np.sin(angle)])
@@ -130,7 +134,7 @@ def test_antialiasing_smooths_the_outline_without_moving_it(shape):
     hard = Renderer(shape, WorldSettings.model_validate(settings)).scenery(CAMERA, pose)
     assert np.abs(soft.astype(float) - hard).mean() < 0.5
     changed = np.any(np.abs(soft.astype(int) - hard) > 8, axis=2)
-    part = Renderer(shape, WorldSettings()).truth(pair(CAMERA), pose).part
+    part = true_view(Renderer(shape, WorldSettings()), pair(CAMERA), pose).part
     outline = cv2.morphologyEx((part != SKY).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)) > 0
     assert changed.any() and (changed & ~outline).mean() < 1e-4
 
@@ -139,7 +143,7 @@ def test_a_distorted_lens_bends_image_and_truth_alike(shape):
     bent = Camera(612, 512, 616.0, 616.0, 300.0, 260.0, (-0.12, 0.03, 0.001, -0.002))
     renderer = Renderer(shape, WorldSettings.model_validate({"camera": {"noise": 0.0}}))
     pose = before(shape, 37.5, 4.0)
-    frames, truth = draw(renderer, pair(bent), pose), renderer.truth(pair(bent), pose)
+    frames, truth = draw(renderer, pair(bent), pose), true_view(renderer, pair(bent), pose)
     blade = (truth.part == INSPECTED).astype(np.uint8)
     away = cv2.distanceTransform(1 - (blade - cv2.erode(blade, np.ones((3, 3), np.uint8))), cv2.DIST_L2, 5)
     inside = truth.trailing[np.all((truth.trailing > 3) & (truth.trailing < [608, 508]), axis=1)]
