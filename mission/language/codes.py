@@ -1,7 +1,8 @@
 """Every code that a check can print: one table, so that nothing is reported that is not declared and documented.
 
 Codes are stable: a code keeps its meaning for good, and one that is no longer used is not given away again.
-M0xx reading, M1xx files and references, M2xx names and values, M3xx the machine as a whole, M4xx proof.
+M0xx reading, M1xx files and references, M2xx names and values, M3xx the machine as a whole, M4xx proof,
+M5xx scenarios.
 """
 
 from __future__ import annotations
@@ -76,6 +77,9 @@ _TABLE = (
     Code("M312", "a state does nothing and nothing leads out of it by itself", _W, allowed=True),
     Code("M401", "a safety property does not hold"),
     Code("M402", "an invariant that the mission states does not hold"),
+    Code("M501", "a scenario file is wrong"),
+    Code("M502", "a scenario does not go as expected"),
+    Code("M503", "scenarios leave states or transitions out"),
 )
 
 CODES: Mapping[str, Code] = MappingProxyType({code.name: code for code in _TABLE})

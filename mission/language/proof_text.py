@@ -25,7 +25,7 @@ def _lines(proof: Proof, traces: bool) -> Iterator[str]:
     for one in proof.events:
         yield f"  {'holds' if not one.failures else 'FAILS'}  {one.event.name.ljust(width)}  {_measure(one)}"
         for failure in one.failures:
-            yield f"         {failure.kind}: {failure.message}"
+            yield f"         M401 {failure.kind}: {failure.message}"
             yield from _trace(failure.trace)
         if traces and one.longest is not None and not one.failures:
             yield from _trace(one.longest.trace)
@@ -33,7 +33,7 @@ def _lines(proof: Proof, traces: bool) -> Iterator[str]:
         what = f"{stated.invariant.kind}: {stated.invariant.statement}"
         yield f"  {'holds' if stated.failure is None else 'FAILS'}  {what}"
         if stated.failure is not None:
-            yield f"         {stated.failure.message}"
+            yield f"         {stated.invariant.location}: M402 {stated.failure.message}"
             yield from _trace(stated.failure.trace)
     for assumption in proof.assumptions:
         yield f"  given that {assumption}"
@@ -94,4 +94,5 @@ def data(proof: Proof) -> dict[str, Any]:
 
 def _failure(failure: Failure) -> dict[str, Any]:
     steps = [{"from": e.source.leaf, "event": e.event, "to": e.target.leaf} for e in failure.trace]
-    return {"kind": failure.kind, "message": failure.message, "trace": steps}
+    code = "M402" if failure.kind == "invariant" else "M401"
+    return {"code": code, "kind": failure.kind, "message": failure.message, "trace": steps}

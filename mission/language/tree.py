@@ -137,16 +137,33 @@ def kind(node: Node) -> str:
 
 
 def merge(below: Table, above: Table) -> Table:
-    """`above` laid over `below`, mapping by mapping. Nothing (`~`) in `above` removes what `below` has."""
+    """`above` laid over `below`, mapping by mapping. Nothing (`~`) in `above` removes what `below` has.
+
+    What `above` adds comes after the key that stands before it there, so that states keep the order of their story.
+    """
     entries = dict(below.entries)
+    before: str | None = None
     for key, entry in above.entries.items():
         present = entries.get(key)
         if present is None:
-            entries[key] = entry
+            entries = _inserted(entries, before, key, entry)
         elif isinstance(entry.node, Scalar) and entry.node.value is None:
             del entries[key]
+            continue
         elif isinstance(present.node, Table) and isinstance(entry.node, Table):
             entries[key] = Entry(entry.key, merge(present.node, entry.node))
         else:
             entries[key] = entry
+        before = key
     return Table(entries, above.location, 1 + sum(entry.node.size for entry in entries.values()))
+
+
+def _inserted(entries: dict[str, Entry], before: str | None, key: str, entry: Entry) -> dict[str, Entry]:
+    if before is None:
+        return {**entries, key: entry}
+    ordered: dict[str, Entry] = {}
+    for name, present in entries.items():
+        ordered[name] = present
+        if name == before:
+            ordered[key] = entry
+    return ordered
