@@ -50,7 +50,7 @@ def draw(
 def render_view(
     shape: TurbineShape, settings: WorldSettings, geometry: RigGeometry, pose: CameraPose, laser: bool = True
 ) -> tuple[StereoFrames, TrueView]:
-    """The images from one pose and what is truly in them. For many poses keep a `Renderer` and call `draw` and its
-    `truth`."""
+    """The images from one pose and what is truly in them. For many poses keep a `Renderer` and call `draw` and
+    `true_view`."""
     renderer = Renderer(shape, settings)
     return draw(renderer, geometry, pose, laser=laser), true_view(renderer, geometry, pose)
