@@ -67,7 +67,12 @@ def _why(history: RunHistory) -> str | None:
     for line in history.journal:
         if line["kind"] == "event":
             said = line
-        elif line["kind"] == "transition" and str(line["to"]).partition(".")[0] in ("abort", "aborted", "refused", "released"):
+        elif line["kind"] == "transition" and str(line["to"]).partition(".")[0] in (
+            "abort",
+            "aborted",
+            "refused",
+            "released",
+        ):
             data = said.get("data") or {}
             reason = data.get("reason") or data.get("error") or data.get("text")
             where = f"in {line['from']}"
