@@ -1,7 +1,7 @@
 """The rotor from afar: its hub and the directions of its three blades in one picture, or why they cannot be told.
 
-The hub is where the axes of three equal blades meet, not the nose of the spinner that hides it: from aside the nose stands
-before another point than the hub's centre.
+The hub is where the axes of three equal blades meet, not the nose of the spinner that hides it: from aside the nose
+stands before another point than the hub's centre.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Expected:
 def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -> FarView:
     """Hub and blades in a picture (h, w, 3) BGR or (h, w) grey taken from 30 to 80 m before the rotor.
 
-    camera: of this picture; with another size the view is refused. Directions and hub are in the image frame as the lens
-    draws it, px of the full image.
+    camera: of this picture; with another size the view is refused. Directions and hub are in the image frame as the
+    lens draws it, px of the full image.
     """
     started = time.perf_counter()
     if image.shape[:2] != (camera.height, camera.width):
@@ -83,7 +83,8 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -
 
 
 def _picture(image: Image, camera: Camera) -> Picture:
-    """Grey, and where there is colour how yellow or blue it is: a grey blade before a blue sky may be equally bright."""
+    """Grey, and where there is colour how yellow or blue it is: a grey blade before a blue sky may be equally
+    bright."""
     if image.ndim == 3:
         colour = image.astype(np.float32)
         grey = colour @ np.array([0.114, 0.587, 0.299], np.float32)

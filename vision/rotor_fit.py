@@ -59,10 +59,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class Fit:
-    """The fitted rotor. parameters (8,): of `vision.rotor_model`. directions (3,) of the blades in the undistorted image.
+    """The fitted rotor. parameters (8,): of `vision.rotor_model`. directions (3,) of the blades in the undistorted
+    image.
 
-    support (3, 2): for each blade, leading and trailing, the share of samples (3, 2) inside the picture that lie on the fitted
-    edge. agreement: share of the edges' whole length on which the picture changes across them.
+    support (3, 2): for each blade, leading and trailing, the share of samples (3, 2) inside the picture that lie on the
+    fitted edge. agreement: share of the edges' whole length on which the picture changes across them.
     """
 
     parameters: Array
@@ -95,7 +96,7 @@ def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
         solution = least_squares(
             _residuals, parameters, args=arguments, x_scale=SCALE, loss="soft_l1", f_scale=1.5, max_nfev=8, xtol=1e-5
         )
-        parameters, jacobian = solution.x, solution.jac
+        parameters, jacobian = solution.x, np.asarray(solution.jac, float)
     residual = EDGE_PX * _residuals(parameters, edges, picture.camera)[: len(edges.real)]
     agrees = edges.real & (np.abs(residual) < AGREES_PX)
     support, samples = np.zeros((3, 2)), np.zeros((3, 2))
@@ -124,8 +125,8 @@ def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
 def settled(picture: Picture, start: Array, rounds: int = 4, tries: int = 240) -> tuple[Array, float]:
     """The parameters (8,) near `start` whose six edges the picture agrees with most, and that agreement, 0 to 1.
 
-    A cross-entropy search: any line of the background may be stronger than one edge of one blade, but nothing else agrees with
-    all six at once. The same picture gives the same answer.
+    A cross-entropy search: any line of the background may be stronger than one edge of one blade, but nothing else
+    agrees with all six at once. The same picture gives the same answer.
     """
     rng = np.random.default_rng(0)
     width = start[5] + start[6]
@@ -163,8 +164,8 @@ def agreement(picture: Picture, parameters: Array, samples: int = 30) -> Array:
 
 @dataclass(frozen=True)
 class EdgePoints:
-    """Points (n, 2) on edges in the picture; the blade (n,), side (n,) and share (n,) of the straight stretch where each was
-    looked for, the direction (n, 2) across the edge, and whether there is a step of brightness at all."""
+    """Points (n, 2) on edges in the picture; the blade (n,), side (n,) and share (n,) of the straight stretch where
+    each was looked for, the direction (n, 2) across the edge, and whether there is a step of brightness at all."""
 
     points: Array
     blade: NDArray[np.int64]
@@ -212,7 +213,8 @@ def edge_points(picture: Picture, parameters: Array, reach: float) -> EdgePoints
 
 
 def _residuals(parameters: Array, edges: EdgePoints, camera: Camera) -> Array:
-    """Distance (n,) of edge points from the model's edges, then (4,) what is known of any rotor, in units of their sigma."""
+    """Distance (n,) of edge points from the model's edges, then (4,) what is known of any rotor, in units of their
+    sigma."""
     model = outline(parameters[None], np.linspace(0, 1, SAMPLES), camera).points[0]
     off = ((edges.points - model[edges.blade, edges.side, edges.share]) * edges.across).sum(axis=1) / EDGE_PX
     result: Array = np.concatenate([off, surprise(parameters[None])[0] * np.sqrt(NEIGHBOURS)])

@@ -1,8 +1,9 @@
-"""What a rotor's straight blade edges look like from anywhere before it: three equal tapered blades on a cone, in perspective.
+"""What a rotor's straight blade edges look like from anywhere before it: three equal tapered blades on a cone, in
+perspective.
 
-Parameters (8,): hub y, z in the image frame (px); turn of the rotor (rad, clockwise from +y_im, of one blade); yaw and tilt of
-the rotor's axis against the camera's (rad); then, at the hub's distance and in px, how far before and behind a blade's axis
-its edges would start at the hub, and the inverse of the distance at which they would meet.
+Parameters (8,): hub y, z in the image frame (px); turn of the rotor (rad, clockwise from +y_im, of one blade); yaw and
+tilt of the rotor's axis against the camera's (rad); then, at the hub's distance and in px, how far before and behind a
+blade's axis its edges would start at the hub, and the inverse of the distance at which they would meet.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ SLENDER = 9.5, 0.2  # length over width of the prolonged edges; sigma of its log
 
 @dataclass(frozen=True)
 class Outline:
-    """Points (k, 3, 2, n, 2) in the undistorted image frame: k rotors, blades, leading and trailing edge, along the edge."""
+    """Points (k, 3, 2, n, 2) in the undistorted image frame: k rotors, blades, leading and trailing edge, along the
+    edge."""
 
     points: Array
     direction: Array  # (k, 3, 2, 2) unit vectors along the edges
@@ -36,7 +38,7 @@ class Outline:
 
 def outline(parameters: Array, shares: Array, camera: Camera) -> Outline:
     """The edges of rotors (k, 8) at shares (n,) of their straight stretch."""
-    hub, lengths = place(parameters, camera)
+    hub, unit = place(parameters, camera)
     axes = rotor_axes(parameters)
     leading, trailing, taper = parameters[:, 5], parameters[:, 6], np.maximum(parameters[:, 7], 1e-4)
     first = INBOARD * (leading + trailing)
@@ -47,9 +49,9 @@ def outline(parameters: Array, shares: Array, camera: Camera) -> Outline:
         along, across = blade_axes(parameters[:, 2] + b * 2 * np.pi / 3, axes)
         for s, root in enumerate((leading, -trailing)):
             w = root[:, None] * (1 - taper[:, None] * r)
-            px, py, pz = (hub[:, k, None] + (r * along[:, k, None] + w * across[:, k, None]) / lengths for k in range(3))
-            points[:, b, s, :, 0] = camera.fx * py / px
-            points[:, b, s, :, 1] = camera.fy * pz / px
+            x, y, z = (hub[:, k, None] + (r * along[:, k, None] + w * across[:, k, None]) / unit for k in range(3))
+            points[:, b, s, :, 0] = camera.fx * y / x
+            points[:, b, s, :, 1] = camera.fy * z / x
     points += np.array([camera.cx, camera.cy]) - camera.centre
     step = points[..., -1, :] - points[..., 0, :]
     return Outline(points, step / np.linalg.norm(step, axis=-1, keepdims=True))

@@ -1,8 +1,8 @@
 """First guesses of a rotor in a picture, from straight edges alone.
 
-Two lines that close slowly may be the edges of a blade, and its axis then runs through the point where they meet. Two such
-blades, 120° apart, that have one length and one width around the crossing of their axes may be a rotor: horizon, tower and
-fields do not have this symmetry, and the third blade may be hard to tell from the tower that it hides.
+Two lines that close slowly may be the edges of a blade, and its axis then runs through the point where they meet. Two
+such blades, 120° apart, that have one length and one width around the crossing of their axes may be a rotor: horizon,
+tower and fields do not have this symmetry, and the third blade may be hard to tell from the tower that it hides.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ MOST_TRIED = 150
 
 @dataclass(frozen=True)
 class Guess:
-    """hub (2,) in the image frame, px. directions (3,) of the blades' axes, rad clockwise from +y_im. At a distance r from the
-    hub the edges lie at leading · (1 - r / length) clockwise and at trailing · (1 - r / length) counter-clockwise of the
-    axis, all in px. score: votes of the six lines."""
+    """hub (2,) in the image frame, px. directions (3,) of the blades' axes, rad clockwise from +y_im. At a distance r
+    from the hub the edges lie at leading · (1 - r / length) clockwise and at trailing · (1 - r / length)
+    counter-clockwise of the axis, all in px. score: votes of the six lines."""
 
     hub: Array
     directions: Array
@@ -39,10 +39,12 @@ class Guess:
     score: float
 
 
-def strongest_lines(planes: Array, most: int = MOST_LINES) -> tuple[Array, Array]:
+def strongest_lines(planes: NDArray[np.float32], most: int = MOST_LINES) -> tuple[Array, Array]:
     """The (θ, ρ) (k, 2) of straight edges, ρ signed, and votes (k,). planes (h, w, c): float32 picture channels."""
     height, width = planes.shape[:2]
-    dx, dy = (cv2.Sobel(planes, cv2.CV_32F, *order, scale=0.25).reshape(height, width, -1) for order in ((1, 0), (0, 1)))
+    dx, dy = (
+        cv2.Sobel(planes, cv2.CV_32F, *order, scale=0.25).reshape(height, width, -1) for order in ((1, 0), (0, 1))
+    )
     strongest = np.argmax(np.abs(dx) + np.abs(dy), axis=2)[..., None]
     gx, gy = (np.take_along_axis(g, strongest, 2)[..., 0] for g in (dx, dy))
     size = np.hypot(gx, gy)
@@ -75,8 +77,8 @@ def strongest_lines(planes: Array, most: int = MOST_LINES) -> tuple[Array, Array
 
 @dataclass(frozen=True)
 class _Blades:
-    """Pairs of lines that two edges of one blade could be: directions (n,), signed distance (n,) of the axis from the image's
-    centre along its clockwise normal, apex (n, 2) where the edges meet, closing angle (n,), votes (n,)."""
+    """Pairs of lines that two edges of one blade could be: directions (n,), signed distance (n,) of the axis from the
+    image's centre along its clockwise normal, apex (n, 2) where the edges meet, closing angle (n,), votes (n,)."""
 
     direction: Array
     offset: Array
@@ -99,11 +101,12 @@ def _blades(lines: Array, votes: Array) -> _Blades:
     return _Blades(axis % (2 * np.pi), offset, apex, closing, strength[one] + strength[other])
 
 
-def guesses(planes: Array, near: Array | None, within_px: float, most: int = 6) -> list[Guess]:
-    """First guesses of the rotor, the best first. near (2,): where the hub is expected in the image frame, within so much.
+def guesses(planes: NDArray[np.float32], near: Array | None, within_px: float, most: int = 6) -> list[Guess]:
+    """First guesses of the rotor, the best first. near (2,): where the hub is expected in the image frame, within so
+    much.
 
-    Two blades 120° apart that have one length and one width at the point where their axes cross make a rotor; lines where
-    the third one must be add to its score.
+    Two blades 120° apart that have one length and one width at the point where their axes cross make a rotor; lines
+    where the third one must be add to its score.
     """
     height, width = planes.shape[:2]
     diagonal = float(np.hypot(width, height))
@@ -138,9 +141,7 @@ def guesses(planes: Array, near: Array | None, within_px: float, most: int = 6) 
         third = first + np.angle(np.exp(1j * (second - first))) / 2 + np.pi
         length, wide = float(np.sqrt(lengths[:, k].prod())), float(np.sqrt(widths[:, k].prod()))
         directions = np.array([first, second, third]) % (2 * np.pi)
-        guess = Guess(
-            hub[k], directions, LEADING_SHARE * wide, (1 - LEADING_SHARE) * wide, length, float(score[k])
-        )
+        guess = Guess(hub[k], directions, LEADING_SHARE * wide, (1 - LEADING_SHARE) * wide, length, float(score[k]))
         guess = replace(guess, score=guess.score + _third(guess, lines, votes))
         rival = next((i for i, g in enumerate(found) if not _apart(guess, g)), None)
         if rival is None:
