@@ -158,7 +158,7 @@ def blade_directions(
     span = np.cos(cone) * (np.sin(turns) * y - np.cos(turns) * z) - np.sin(cone) * x
     points = camera.project(pose.from_ned(np.vstack([hub, hub + span])))
     step = points[1:] - points[0]
-    return np.arctan2(step[:, 1], step[:, 0])
+    return np.asarray(np.arctan2(step[:, 1], step[:, 0]), float)
 
 
 def _seen(camera: Camera, pose: CameraPose, point: Array) -> Array:

@@ -92,6 +92,19 @@ def located(turbine: Turbine, camera: Camera, sights: Sequence[FarSight]) -> Tur
 
     The blade to inspect is the one whose azimuth is nearest to what was believed.
     """
-    from vision.triangulation import locate_rotor
+    from vision.triangulation import RotorBelief, locate_rotor
 
-    raise NotImplementedError(locate_rotor)
+    belief = RotorBelief(
+        turbine.hub, turbine.hub_sigma_m, turbine.heading, turbine.heading_sigma, turbine.tilt, turbine.cone
+    )
+    fix = locate_rotor([(sight.pose, sight.view) for sight in sights], camera, belief)
+    if not fix.valid:
+        return None
+    return turbine.refined(
+        hub=fix.hub.position,
+        heading=fix.heading,
+        azimuth=fix.azimuth_near(turbine.azimuth),
+        hub_sigma_m=float(np.sqrt(np.linalg.eigvalsh(fix.hub.covariance)[-1])),
+        heading_sigma=fix.heading_sigma,
+        azimuth_sigma=fix.azimuth_sigma,
+    )
