@@ -113,9 +113,8 @@ class SetpointStream:
             task.cancel()
 
     async def _stream(self) -> None:
-        period = self._clock.speed / self._rate_hz
         while True:
-            await self._clock.sleep(period)
+            await self._clock.sleep(self._clock.speed / self._rate_hz)
             alive = self._wall() - self._stroked <= self._stroke_s
             if alive:
                 self._stalled = False

@@ -49,6 +49,7 @@ class VehicleServer:
         self._answered: dict[tuple[str, int], dict[str, Any]] = {}
         self._asking: tuple[str, int] = ("", 0)
         self._log = TruthLog(settings.folder, self.vehicle, wall=True) if settings.folder is not None else None
+        self._speed = settings.speed
         self._origin_s = time.monotonic()
         self._left_out_s = 0.0
         self._stopping: str | None = None
@@ -66,6 +67,11 @@ class VehicleServer:
             "speed": self._settings.speed,
         }
 
+    def change_speed(self, speed: float) -> None:
+        """Go on from now at another speed; the autopilot's time-outs stay as they were multiplied at the start."""
+        self._speed = speed
+        self._origin_s = time.monotonic() - self.vehicle.time_s / speed
+
     def stop(self, reason: str) -> None:
         """End `run` soon."""
         self._stopping = reason
@@ -73,7 +79,7 @@ class VehicleServer:
     def run(self) -> None:
         """Fly until stopped, or until the parent is gone and the vehicle has landed."""
         sockets = [self._truth, *(face.link.socket for face in self.faces)]
-        self._origin_s = time.monotonic() - self.vehicle.time_s / self._settings.speed
+        self._origin_s = time.monotonic() - self.vehicle.time_s / self._speed
         try:
             while self._stopping is None:
                 select.select(sockets, [], [], _WAKE_S)
@@ -107,7 +113,7 @@ class VehicleServer:
 
     def _advance(self) -> None:
         """Bring simulated time up to the wall clock."""
-        speed = self._settings.speed
+        speed = self._speed
         behind_s = time.monotonic() - self._origin_s - self.vehicle.time_s / speed
         if behind_s > _LAG_MAX_S:
             self._origin_s += behind_s - _LAG_MAX_S
@@ -158,6 +164,8 @@ class VehicleServer:
         try:
             if name == "stop":
                 self.stop("asked to")
+            elif name == "speed":
+                self.change_speed(float(request["speed"]))
             else:
                 self._switches.run(name, request)
         except ValueError as error:

@@ -165,6 +165,7 @@ def _compose(
         clock=stage.clock,
         mount=mission.rig.mount_m,
         sink=recorder,
+        pace=stage.pace,
         latency_s=SIMULATED_LATENCY_S if options.lockstep else 0.0,
     )
 
@@ -205,6 +206,8 @@ def _compose(
     if stage.world is not None:
         rehearsal = Rehearsal(stage.world, stage.switch, lambda: executive.state)
         beside["faults"] = rehearsal.run(stage.clock)
+    if stage.pace is not None:
+        beside["pace"] = stage.pace.run()
     return executive, beside
 
 

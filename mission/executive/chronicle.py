@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from mission.language.semantics import Configuration, Quantities, Step
 
 if TYPE_CHECKING:
     from mission.executive.clock import Clock
-    from mission.executive.services import Services
+    from mission.executive.services import Memory, Services
 
 
 class Chronicle:
@@ -22,7 +23,7 @@ class Chronicle:
     def __init__(self, journal: Journal, clock: Clock, mission: Mission, services: Services) -> None:
         self.journal = journal
         self._clock, self._mission, self._services = clock, mission, services
-        self._told: dict[str, Any] = {}
+        self._told: Memory | None = None
         self._station_m: float | None = None
 
     def begins(self, configuration: Configuration, *, autonomy: str, resumed: bool) -> None:
@@ -56,7 +57,7 @@ class Chronicle:
             "guards": guards or None,
         }
         given = {name: value for name, value in about.items() if value is not None}
-        self._line("event", event=queued.name, state=state, led_to=led_to, **given)
+        self._line("event", soon=led_to == "transition", event=queued.name, state=state, led_to=led_to, **given)
 
     def steps(self, step: Step) -> None:
         """A transition that is about to be made."""
@@ -100,8 +101,8 @@ class Chronicle:
         self.journal.append(kind, self._clock.now(), **fields)
 
     def _news(self) -> Mapping[str, Any] | None:
-        memory = asdict(self._services.memory)
+        memory = self._services.memory
         if memory == self._told:
             return None
-        self._told = memory
-        return memory
+        self._told = deepcopy(memory)
+        return asdict(memory)

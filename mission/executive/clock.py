@@ -11,6 +11,7 @@ from contextlib import suppress
 from typing import Any, Protocol, TypeVar
 
 T = TypeVar("T")
+LONGEST_SLEEP_S = 0.5  # wall seconds, after which a sleeper looks whether the speed has changed
 
 
 class Clock(Protocol):
@@ -36,7 +37,7 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """Wall time, `speed` times faster: 1 for a real flight."""
+    """Wall time, `speed` times faster: 1 for a real flight. The speed may change on the way; time never jumps."""
 
     def __init__(self, speed: float = 1.0, start_s: float = 0.0) -> None:
         self.speed = speed
@@ -47,8 +48,18 @@ class WallClock:
     def now(self) -> float:
         return self._start_s + (time.monotonic() - self._origin) * self.speed
 
+    def change_speed(self, speed: float) -> None:
+        """Go on from now at another speed."""
+        wall = time.monotonic()
+        self._start_s += (wall - self._origin) * self.speed
+        self._origin, self.speed = wall, speed
+
     async def sleep(self, seconds: float) -> None:
-        await asyncio.sleep(max(seconds, 0.0) / self.speed)
+        due = self.now() + max(seconds, 0.0)
+        while True:
+            await asyncio.sleep(min(max(due - self.now(), 0.0) / self.speed, LONGEST_SLEEP_S))
+            if self.now() >= due - 1e-6:
+                return
 
     async def work(self, function: Callable[..., T], *arguments: Any) -> T:
         return await asyncio.get_running_loop().run_in_executor(self._worker, function, *arguments)

@@ -251,7 +251,7 @@ class Executive:
             self._chronicle.happened(queued, "confirmation", self.state, {})
             self.confirm(True)
             return
-        quantities = self._quantities()
+        quantities = self._quantities() if self._asked(queued) else {}
         decision = decide(self.mission, self._machine.configuration, queued, quantities, self.autonomy)
         self._chronicle.happened(queued, decision.led_to, self.state, quantities)
         transition = decision.transition
@@ -275,7 +275,8 @@ class Executive:
         await self._stop()
         step = semantics.take(self.mission, self._machine.configuration, transition, queued.name)
         self._chronicle.steps(step)
-        await self._helm.patiently(self._chronicle.journal.durable())
+        if self._chronicle.journal.pending:
+            await self._helm.patiently(self._chronicle.journal.durable())
         await self._machine.take(queued.name, quantities, queued.origin, transition)
         now = self._clock.now()
         self._timing = self._timing.stepping(self.mission, step, now)
@@ -358,6 +359,11 @@ class Executive:
             standoff_m=getattr(state.parameters, "standoff_m", None) if keeps else None,
             was_ours=was_ours,
         )
+
+    def _asked(self, queued: Queued) -> bool:
+        """Whether any guard has a say in what this event leads to."""
+        handlers = self.mission.handlers(queued.origin or self.state, queued.name)
+        return any(transition.guarded for transition in handlers)
 
     def _quantities(self) -> dict[str, float | bool | None]:
         """Values for the guards, rounded as the journal keeps them, so that a replay decides the same."""

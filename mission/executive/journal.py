@@ -54,22 +54,27 @@ class Journal:
         self._writer = ThreadPoolExecutor(1, "journal") if threaded and path is not None else None
         self._last: Future[None] | None = None
 
-    def append(self, kind: str, t: float, **fields: Any) -> Entry:
-        """Write one line; `durable` waits for it."""
+    @property
+    def pending(self) -> bool:
+        """Whether there is anything to wait for."""
+        return self._last is not None and not self._last.done()
+
+    def append(self, kind: str, t: float, *, soon: bool = False, **fields: Any) -> Entry:
+        """Write one line; `durable` waits for it. `soon`: the line that follows at once takes this one to the disk."""
         entry = Entry(self._seq, round(t, 3), kind, {name: _plain(value) for name, value in fields.items()})
         self._seq += 1
         line = json.dumps(
             {"seq": entry.seq, "t": entry.t, "kind": kind, **entry.fields}, allow_nan=False, ensure_ascii=False
         )
         if self._writer is not None:
-            self._last = self._writer.submit(self._write, line)
+            self._last = self._writer.submit(self._write, line, soon)
         else:
-            self._write(line)
+            self._write(line, soon)
         return entry
 
     async def durable(self) -> None:
         """Wait until every line so far is on the disk, or lost, or the disk has taken too long."""
-        if self._last is not None and not self._last.done():
+        if self._last is not None and self.pending:
             await asyncio.wait([asyncio.wrap_future(self._last)], timeout=_SLOWEST_DISK_S)
 
     def close(self) -> None:
@@ -84,7 +89,7 @@ class Journal:
                 self._fail(error)
             self._file = None
 
-    def _write(self, line: str) -> None:
+    def _write(self, line: str, soon: bool) -> None:
         if self._file is None:
             return
         if self.error is not None:
@@ -93,7 +98,7 @@ class Journal:
         try:
             self._file.write(line.encode() + b"\n")
             self._file.flush()
-            if self._sync:
+            if self._sync and not soon:
                 os.fsync(self._file.fileno())
         except (OSError, ValueError) as error:
             self._fail(error)

@@ -7,7 +7,7 @@ of events that one event falls back to are compiled into guarded transitions, so
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -32,6 +32,11 @@ class _State(NestedAsyncState):
 
 class _Library(HierarchicalAsyncMachine):
     state_cls = _State
+
+    @staticmethod
+    async def await_all(callables: Iterable[Callable[[], Awaitable[Any]]]) -> list[Any]:
+        """One after the other: a task for each guard would cost more than all guards together."""
+        return [await call() for call in callables]
 
 
 @dataclass

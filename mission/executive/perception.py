@@ -17,6 +17,7 @@ from vision.observation import BladeObservation, FarView
 
 if TYPE_CHECKING:
     from mission.executive.clock import Clock
+    from mission.executive.pace import Pace
     from vision.estimate import BladeEstimate, BladeFrame
     from vision.tracker import BladeTracker, UpdateResult
 
@@ -68,12 +69,14 @@ class VisionLoop:
         clock: Clock,
         mount: tuple[float, float, float],
         sink: CycleSink,
+        pace: Pace | None = None,
         rate_hz: float = 5.0,
         latency_s: float = 0.0,
     ) -> None:
         self._rig, self._eye, self._find_rotor = rig, eye, find_rotor
         self._new_tracker = tracker
         self._autopilot, self._clock, self._sink = autopilot, clock, sink
+        self._pace = pace
         self._mount = np.array(mount)
         self._period_s = 1.0 / rate_hz
         self._latency_s = latency_s
@@ -162,7 +165,11 @@ class VisionLoop:
             due = max(due + self._period_s, now)
             if self._watching:
                 async with self._busy:
+                    if self._pace is not None:
+                        self._pace.begin()
                     await self._one_cycle()
+                    if self._pace is not None:
+                        self._pace.end()
             await self._clock.sleep(max(due - self._clock.now(), 0.002))
 
     async def _one_cycle(self) -> None:

@@ -126,7 +126,6 @@ class Services:
 
     async def ticks(self, rate_hz: float = 20.0) -> AsyncIterator[float]:
         """Yield the mission time `rate_hz` times a mission second, but never more than 50 times a wall second."""
-        period = max(1.0 / rate_hz, self.clock.speed / 50.0)
         while True:
             yield self.clock.now()
-            await self.clock.sleep(period)
+            await self.clock.sleep(max(1.0 / rate_hz, self.clock.speed / 50.0))

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flight.autopilot import Autopilot
     from mission.executive.assembly import FlightOptions
     from mission.executive.clock import Clock
+    from mission.executive.pace import Pace
     from vision.camera import RigGeometry
 
 
@@ -38,6 +39,7 @@ class Stage:
     rig: Rig
     world: World | None = None
     switch: Switch | None = None
+    pace: Pace | None = None
 
 
 @contextmanager
@@ -96,7 +98,13 @@ def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
         )
         rig, switch = _rig(options, stack, world, vehicle, clock, autopilot)
         stack.callback(rig.close)
-        yield Stage(asyncio.new_event_loop, clock, autopilot, rig, world, switch)
+        pace = None
+        if switch is not None:
+            from mission.executive.pace import Pace
+
+            throw = switch
+            pace = Pace(clock, speed, lambda faster: throw("speed", speed=faster))
+        yield Stage(asyncio.new_event_loop, clock, autopilot, rig, world, switch, pace)
 
 
 def _geometry(options: FlightOptions) -> RigGeometry:
