@@ -186,9 +186,8 @@ class LiveView(_Watcher):
                     self._press(executive, key)
 
     def _press(self, executive: Executive, key: str) -> None:
-        if self._question is not None:
-            if key in "yYnN":
-                self._settle(key in "yY")
+        if self._question is not None and key in "yYnN":
+            self._settle(key in "yY")
             return
         command = KEYS.get(key.lower())
         if command is None:

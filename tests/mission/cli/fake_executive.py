@@ -59,6 +59,7 @@ class FakeExecutive:
 
     def raise_event(self, name: str, **data: Any) -> None:
         self.raised.append(name)
+        self.waiting = None
         with self._journal.open("a") as file:
             file.write(
                 json.dumps({"seq": 99, "t": self.now_s, "kind": "operator", "command": name, "who": "me"}) + "\n"

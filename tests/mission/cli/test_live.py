@@ -183,11 +183,23 @@ def test_keys_reach_the_executive_and_the_terminal_is_as_before_afterwards(tmp_p
         terminal.close()
 
 
-def test_a_question_is_answered_by_a_key_and_keys_mean_nothing_else_meanwhile(tmp_path: Path) -> None:
+def test_a_question_is_answered_by_a_key(tmp_path: Path) -> None:
     terminal = Terminal(tmp_path, "--ask")
     try:
         terminal.wait_for("Arm the vehicle?")
-        terminal.press("aya")
+        terminal.press("y")
+        terminal.wait_for("wanted")
+        terminal.press("a")
         terminal.wait_for("raised ['abort'], answered True")
+    finally:
+        terminal.close()
+
+
+def test_an_abort_waits_for_no_answer(tmp_path: Path) -> None:
+    terminal = Terminal(tmp_path, "--ask")
+    try:
+        terminal.wait_for("Arm the vehicle?")
+        terminal.press("a")
+        terminal.wait_for("raised ['abort'], answered False")
     finally:
         terminal.close()
