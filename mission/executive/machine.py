@@ -38,6 +38,11 @@ class _Library(HierarchicalAsyncMachine):
         """One after the other: a task for each guard would cost more than all guards together."""
         return [await call() for call in callables]
 
+    async def callbacks(self, funcs: Iterable[Any], event_data: Any) -> None:
+        """One after the other, and nothing at all where there are none."""
+        for func in funcs:
+            await self.callback(func, event_data)
+
 
 @dataclass
 class _Attempt:
@@ -106,6 +111,8 @@ class Machine:
             if name in self._library.events and await self._position.trigger(name):  # type: ignore[attr-defined]
                 break
         if attempt.taken is None:
+            if only is not None:
+                raise MachineError(f"{event} in {before.leaf}: {only.key} was chosen, but the machine did not take it")
             return None
         step = semantics.take(self.mission, before, attempt.taken, event)
         if self.state != step.after.leaf:
