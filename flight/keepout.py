@@ -112,11 +112,9 @@ class KeepOut:
             faded = old.trust - elapsed_s / DISTRUST_S
             return replace(self, surface=replace(old, trust=faded) if faded > 0 else None)
         frame = self.turbine.blade_frame()
-        station, offset, depth = (float(v) for v in frame.to_blade(estimate.point))
-        along, across, inward = (float(v) for v in frame.rotation @ estimate.normal)
-        edges = [side.offset_m for side in (estimate.leading, estimate.trailing) if side is not None]
-        looked_at = float(np.clip(offset, min(edges, default=offset), max(edges, default=offset)))
-        front = min([0.0, *(-across / inward * (edge - looked_at) for edge in edges)])
+        station, _, depth = (float(v) for v in frame.to_blade(estimate.point))
+        along, _, inward = (float(v) for v in frame.rotation @ estimate.normal)
+        front = min(0.0, estimate.nearest_m - estimate.distance_m)
         trust = min(1.0, (old.trust if old else 0.0) + elapsed_s / TRUST_S)
         surface = BladeSurface(station, depth + front, -along / inward, estimate.distance_sigma_m, trust)
         return replace(self, surface=surface)
