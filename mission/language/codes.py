@@ -73,7 +73,7 @@ _TABLE = (
     Code("M308", "the way out after a safety event relies on vision", allowed=True),
     Code("M309", "the mission can end in the air"),
     Code("M310", "a behaviour is started on the wrong side of take-off", allowed=True),
-    Code("M311", "a distance in a behaviour contradicts the limits of its state", _W, allowed=True),
+    Code("M311", "a standoff contradicts the clearance of its state", _W, allowed=True),
     Code("M312", "a state does nothing and nothing leads out of it by itself", _W, allowed=True),
     Code("M401", "a safety property does not hold"),
     Code("M402", "an invariant that the mission states does not hold"),

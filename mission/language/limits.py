@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mission.language.file_model import FileModel
 
@@ -32,3 +32,9 @@ class Limits(FileModel):
     position_sigma_m: float = Field(
         5.0, gt=0, le=100, description="Uncertainty of the position, as the autopilot claims it; above it gps_degraded."
     )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Limits:
+        if self.battery_critical_percent >= self.battery_percent:
+            raise ValueError("battery_critical_percent must be below battery_percent")
+        return self

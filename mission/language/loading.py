@@ -91,8 +91,10 @@ def examine(path: Path, overrides: Sequence[str] = (), rig: str | None = None, c
         problems.extend(check(mission))
     findings = _silenced(problems, sources.allowed, checked)
     if mission is not None:
-        silenced = sorted({finding.code for finding in problems} - {finding.code for finding in findings})
-        header = f"# allow in this file: {', '.join(silenced)}\n" if silenced else ""
+        silenced = {finding.code for finding in problems} - {finding.code for finding in findings}
+        if mission.parameters:
+            silenced.add("M107")  # references to them are resolved
+        header = f"# allow in this file: {', '.join(sorted(silenced))}\n" if silenced else ""
         mission = replace(mission, resolved_yaml=header + mission.resolved_yaml)
     return Examination(None if _errors(findings) else mission, findings)
 

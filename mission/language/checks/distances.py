@@ -9,7 +9,7 @@ from mission.language.exploration import Exploration
 
 
 def contradictions(exploration: Exploration) -> Iterator[Diagnostic]:
-    """M311: a standoff at or inside the clearance, a distance beyond the geofence."""
+    """M311: a standoff at or inside the clearance."""
     for leaf in exploration.leaves:
         state = exploration.mission.states[leaf]
         limits = state.limits or exploration.mission.limits
@@ -17,7 +17,3 @@ def contradictions(exploration: Exploration) -> Iterator[Diagnostic]:
         if isinstance(standoff, int | float) and standoff <= limits.clearance_m:
             message = f"standoff_m {standoff:g} in {leaf!r} is not above limits.clearance_m {limits.clearance_m:g}"
             yield Diagnostic(state.location, "M311", message, "too_close would be raised at once")
-    limits = exploration.mission.limits
-    if limits.battery_critical_percent >= limits.battery_percent:
-        message = "limits.battery_critical_percent is not below limits.battery_percent"
-        yield Diagnostic(exploration.mission.states[exploration.mission.initial].location, "M311", message)
