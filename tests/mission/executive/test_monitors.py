@@ -111,13 +111,16 @@ def test_on_the_ground_it_is_silent(name: str) -> None:
 def test_the_limit_it_names_exists_and_decides(name: str) -> None:
     limit = monitors()[name].limit
     assert limit is not None
-    generous = {"battery_percent": 0.0, "battery_critical_percent": 0.0, "clearance_m": 0.5}.get(limit, 60.0)
-    if limit == "geofence_m":
-        generous = 1000.0
-    if limit in ("standoff_error_m", "wind_m_s"):
-        generous = 20.0
-    ill = replace(WELL, **ILL[name])
-    assert raised(name, replace(ill, limits=Limits(**{limit: generous})), 8.0)[0] == []
+    generous: dict[str, dict[str, float]] = {
+        "battery_percent": {"battery_percent": 1.0, "battery_critical_percent": 0.0},
+        "battery_critical_percent": {"battery_critical_percent": 0.0},
+        "clearance_m": {"clearance_m": 0.5},
+        "geofence_m": {"geofence_m": 1000.0},
+        "standoff_error_m": {"standoff_error_m": 20.0},
+        "wind_m_s": {"wind_m_s": 20.0},
+    }
+    limits = Limits(**generous.get(limit, {limit: 60.0}))
+    assert raised(name, replace(WELL, **ILL[name], limits=limits), 8.0)[0] == []
 
 
 def test_a_single_false_match_is_not_too_close() -> None:
