@@ -31,7 +31,8 @@ class TrackerSettings:
     """What the tracker assumes of blade, vehicle and observations. Lengths in metres, angles in radians, slopes in m/m.
 
     prior_*: how far the survey may be wrong where nothing has been seen. *_per_root_m: random walk of a slope per
-    square root of a metre travelled (taper, twist, bend). drift_*: random walk of the vehicle's local position.
+    square root of a metre travelled (taper, twist, bend). round_*: near the root the blade is as round as a barrel, and
+    its slope across turns within a hand's breadth; fully so inside the first station, no more beyond the second. drift_*: random walk of the vehicle's local position.
     attitude_sigma: of the camera's angles. surface_*, edge_*: what plane and straight line leave out, added to what an
     observation claims. gate: share of good measurements that each χ² gate lets pass. confirmations: agreeing
     observations before anything is estimated. After `patience` rejections in a row the covariance is inflated at each
@@ -47,6 +48,8 @@ class TrackerSettings:
     prior_offset_slope: float = 0.3
     depth_slope_per_root_m: float = 0.03
     across_slope_per_root_m: float = 0.08
+    round_across_slope_per_root_m: float = 0.5
+    round_within_m: tuple[float, float] = (4.0, 9.0)
     leading_slope_per_root_m: float = 0.04
     trailing_slope_per_root_m: float = 0.08
     drift_m_per_root_s: float = 0.04
@@ -62,7 +65,7 @@ class TrackerSettings:
     inflation_m: float = 0.1
     inflation_slope: float = 0.03
     inflation_limit_m: float = 0.25
-    restart_after: int = 10
+    restart_after: int = 6
     restart_deeper_m: float = 1.0
     history_s: float = 1.0
 
@@ -90,7 +93,7 @@ class BladeModel:
         """The same blade around another reference point, with the noise of what lies between (6.1)."""
         along, across = station - self.station, offset - self.offset
         mean, covariance = kalman.predict(
-            self.mean, self.covariance, F=moving(along, across), Q=travel_noise(along, across, settings)
+            self.mean, self.covariance, F=moving(along, across), Q=travel_noise(along, across, station, settings)
         )
         return BladeModel(station, offset, mean, covariance)
 
@@ -131,8 +134,8 @@ def moving(along: float, across: float) -> Array:
     return transition
 
 
-def travel_noise(along: float, across: float, settings: TrackerSettings) -> Array:
-    """Q (7, 7) of moving the reference: slopes wander, and what they lead to wanders as their integral."""
+def travel_noise(along: float, across: float, station: float, settings: TrackerSettings) -> Array:
+    """Q (7, 7) of moving the reference to a station: slopes wander, and what they lead to wanders as their integral."""
     noise = np.zeros((SIZE, SIZE))
 
     def wander(value: int, slope: int, per_root_m: float, distance: float) -> None:
@@ -143,8 +146,10 @@ def travel_noise(along: float, across: float, settings: TrackerSettings) -> Arra
         noise[slope, slope] += per_root_m**2 * length
 
     wander(DEPTH, DEPTH_SLOPE, settings.depth_slope_per_root_m, along)
-    wander(DEPTH, ACROSS_SLOPE, settings.across_slope_per_root_m, across)
-    noise[ACROSS_SLOPE, ACROSS_SLOPE] += settings.across_slope_per_root_m**2 * abs(along)
+    flat, roundness = settings.across_slope_per_root_m, settings.round_across_slope_per_root_m
+    turning = float(np.interp(station, settings.round_within_m, (roundness, flat)))
+    wander(DEPTH, ACROSS_SLOPE, turning, across)
+    noise[ACROSS_SLOPE, ACROSS_SLOPE] += flat**2 * abs(along)
     wander(EDGE["leading"].start, EDGE["leading"].start + 1, settings.leading_slope_per_root_m, along)
     wander(EDGE["trailing"].start, EDGE["trailing"].start + 1, settings.trailing_slope_per_root_m, along)
     return noise

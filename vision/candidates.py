@@ -26,11 +26,13 @@ class Blade:
     """The dots of the blade (n, 2), and where dots would be if it went on but are none, (m, 2); image frame, working px.
 
     texture: how strong steps on the blade itself are, between neighbouring dots, in grey levels.
+    strays: share of the dots that may lie beyond an edge all the same.
     """
 
     dots: Array
     absent: Array
     texture: float
+    strays: float = 0.03
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     distance = dots @ normal.T - rho  # (dots, lines), positive beyond the line along its normal
     inside, outside = (distance < 7).mean(axis=0), (distance > -7).mean(axis=0)
     flip = outside > inside
-    keep = np.maximum(inside, outside) >= 0.96
+    keep = np.maximum(inside, outside) > 0.99 - blade.strays
     normal[flip], rho = -normal[flip], np.where(flip, -rho, rho)
     normal, rho = normal[keep][:CANDIDATES], rho[keep][:CANDIDATES]
     if len(rho) == 0:
@@ -98,7 +100,8 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
         profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, low, high), reach, slopes)
         normal, rho = profile.normal, profile.rho
         low, high = _beside(dots, normal)
-    on_side = (dots @ normal.T - rho > 2.5).mean(axis=0) <= 0.03
+    crossed = (dots @ normal.T - rho > 2.5).mean(axis=0)
+    on_side = crossed <= blade.strays
     beside = (profile.t > low[:, None] - 8) & (profile.t < high[:, None] + 8)
     few = beside.sum(axis=1) < 6
     beside[few] = True
@@ -108,6 +111,7 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     if len(good) == 0:
         return []
     profile = profile.take(good)
+    crossed = crossed[good]
     beside, support, low, high = beside[good], support[good], low[good], high[good]
     step = _typical_step(profile, beside)
     parallax = _parallax(profile, other, beside, noise) if other is not None else np.full(len(good), np.nan)
@@ -127,6 +131,7 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
             + (0.2 if np.isnan(told) else 0.6 * told if told > 0.5 else -5.0 * (0.5 - told))
             - 2.0 * blocked[k]
             - 2.5 * empty
+            - 5.0 * crossed[k]
             + 0.15 * min(beyond, 6)
         )
         found.append(

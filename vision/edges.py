@@ -61,7 +61,7 @@ def _choose(candidates: list[Candidate]) -> tuple[Candidate, ...]:
     return (good[0],)
 
 
-def edge_of(candidate: Candidate, factor: int) -> Edge:
+def edge_of(candidate: Candidate, factor: float) -> Edge:
     """The candidate as an edge in pixels of the full image."""
     normal = candidate.outward if candidate.rho >= 0 else -candidate.outward
     profile, k = candidate.profile, candidate.index

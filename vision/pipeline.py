@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -16,30 +15,18 @@ from vision.candidates import Blade, Candidate, OtherEye, texture_between
 from vision.edges import edge_of, find_edges
 from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser
 from vision.lines import sensor_noise, smoothed
-from vision.observation import BladeObservation, Dots, Line, Tip
+from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import green, reduce_image, reduction_factor, to_full, tones
+from vision.single import observe_photograph
+from vision.stopwatch import Stopwatch
 from vision.surface import Surface, fit_surface
-from vision.tip import find_tip
+from vision.tip import find_tip, tip_of
 
 Array = NDArray[np.float64]
 
 LEAST_DOTS = 5
 SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade
-
-
-class Stopwatch:
-    """Milliseconds per stage."""
-
-    def __init__(self) -> None:
-        self.elapsed_ms: dict[str, float] = {}
-        self._last = self._first = time.perf_counter()
-
-    def lap(self, stage: str) -> None:
-        now = time.perf_counter()
-        self.elapsed_ms[stage] = self.elapsed_ms.get(stage, 0.0) + 1e3 * (now - self._last)
-        self.elapsed_ms["total"] = 1e3 * (now - self._first)
-        self._last = now
 
 
 class Eye:
@@ -124,15 +111,6 @@ class Eye:
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]
         width = chord(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
-        tip = None
-        if outline is not None:
-            rho = outline.rho
-            normal = outline.normal if rho >= 0 else -outline.normal
-            tip = Tip(
-                Line(float(np.arctan2(normal[1], normal[0])), abs(rho) * factor),
-                outline.point * factor,
-                outline.sigma_px * factor,
-            )
         direction = heading(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
         sharp = sharpness(clean, edges)
         bright = exposure(images["left"], seeds)
@@ -161,7 +139,7 @@ class Eye:
             distance_sigma_m=float(np.sqrt(surface.covariance[0, 0])),
             nearest_m=float(np.linalg.norm(points, axis=1).min()),
             edges=tuple(edge_of(edges[k], factor) for k in order),
-            tip=tip,
+            tip=tip_of(outline, factor) if outline is not None else None,
             heading=direction,
             heading_sigma=_heading_sigma(edges),
             chord_m=width[0] if width else None,
@@ -177,6 +155,8 @@ class Eye:
         assert laser is not None
         uv, row, column = left.uv[matches.left], matches.row, matches.column
         rest = np.setdiff1d(np.arange(len(left)), matches.left)
+        if len(matches):
+            rest = rest[left.level[rest] > 0.4 * float(np.median(left.level[matches.left]))]
         inverse = surface.inverse_depth(rays[rest])
         rest, inverse = rest[inverse > 0.03], inverse[inverse > 0.03]
         if len(rest):
@@ -225,6 +205,18 @@ class Eye:
     def _refused(self, frames: StereoFrames, watch: Stopwatch, *reasons: str) -> BladeObservation:
         watch.lap("rest")
         return replace(BladeObservation(frames.stamp_s, False, reasons), elapsed_ms=watch.elapsed_ms)
+
+
+def observe_single(image: Image, geometry: RigGeometry | None = None) -> BladeObservation:
+    """Dots, edges and tip of one laser-on photograph (h, w) or (h, w, 3), in its own pixels. There is no distance in it: the
+    rig's geometry is accepted so that a caller need not ask, and checked against the image's size."""
+    if geometry is not None:
+        camera = geometry.stereo.left
+        if image.shape[:2] != (camera.height, camera.width):
+            raise ValueError(
+                f"image is {image.shape[1]} × {image.shape[0]} pixels, the rig's camera {camera.width} × {camera.height}"
+            )
+    return observe_photograph(image)
 
 
 def _blade_of(matches: Matches) -> Matches:

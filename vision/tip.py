@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vision.capture import Image
 from vision.candidates import Candidate
 from vision.lines import sampled, visible_stretch
+from vision.observation import Line, Tip
 
 Array = NDArray[np.float64]
 
@@ -184,3 +185,10 @@ def _outline(
     point = outermost * toward + middle_lane * across
     scatter = float(np.std(residual[agree])) / np.sqrt(max(agree.sum() / 3, 1)) + 1.0
     return Outline(toward, point, normal, float(normal @ top), scatter)
+
+
+def tip_of(outline: Outline, factor: float) -> Tip:
+    """The outline as a tip in pixels of the full image."""
+    normal = outline.normal if outline.rho >= 0 else -outline.normal
+    line = Line(float(np.arctan2(normal[1], normal[0])), abs(outline.rho) * factor)
+    return Tip(line, outline.point * factor, outline.sigma_px * factor)
