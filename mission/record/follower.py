@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from mission.executive.events import EVENTS, Severity
+
 
 class JournalFollower:
     """Reads what was added since the last look; a half-written line waits for its end."""
@@ -42,7 +44,7 @@ def told(line: Mapping[str, Any]) -> str:
             return f"{'goes on' if line.get('resumed') else 'begins'} in {line.get('state')}"
         case "transition":
             return f"{line.get('event')} → {line.get('to')}"
-        case "event" if line.get("led_to") != "transition":
+        case "event" if line.get("led_to") != "transition" and not _small(line):
             return f"{line.get('event')}: {line.get('led_to')}"
         case "operator":
             return f"{line.get('who')}: {line.get('command')}"
@@ -51,3 +53,9 @@ def told(line: Mapping[str, Any]) -> str:
         case "end":
             return f"{line.get('outcome')} in {line.get('state')}"
     return ""
+
+
+def _small(line: Mapping[str, Any]) -> bool:
+    """News that changed nothing and that nobody has to act on."""
+    event = EVENTS.get(str(line.get("event")))
+    return line.get("led_to") in ("ignored", "stale") and event is not None and event.severity is Severity.INFO

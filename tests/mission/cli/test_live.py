@@ -21,7 +21,7 @@ from mission.cli.live import PlainView, where
 from mission.cli.panel import draw
 from mission.cli.scene import Next, Scene, VisionRate, take_scene
 from mission.record.folder import RunFolder
-from mission.record.follower import JournalFollower
+from mission.record.follower import JournalFollower, told
 from tests.mission.cli.fake_executive import MISSION, FakeExecutive
 from tests.mission.cli.program import ROOT
 from tests.mission.record.synthetic_run import write_journal
@@ -112,6 +112,15 @@ def test_the_journal_is_followed_line_by_line_and_half_lines_wait(tmp_path: Path
     path.write_text(line + "\n" + json.dumps({"seq": 1, "t": 2.0, "kind": "memory"}) + "\nnonsense\n")
     assert list(follower.news()) == [(1.5, "done → inspect.survey")]
     assert list(follower.news()) == []
+
+
+def test_news_that_changed_nothing_is_left_out_and_an_unanswered_danger_is_not() -> None:
+    def line(event: str, led_to: str) -> dict[str, Any]:
+        return {"seq": 0, "t": 0.0, "kind": "event", "event": event, "led_to": led_to, "state": "x"}
+
+    assert told(line("keep_out_bounded", "ignored")) == ""
+    assert told(line("wind_high", "ignored")) == "wind_high: ignored"
+    assert told(line("tip_detected", "asked")) == "tip_detected: asked"
 
 
 def test_without_a_terminal_every_transition_is_a_plain_line(
