@@ -67,8 +67,14 @@ class RunFiles:
                 if line.get("accepted") and (line.get("sharpness") or 0.0) >= SHARP
             ),
             standoff[0] if standoff else None,
-            next((line["tip_station_m"] for line in reversed(journal) if line.get("tip_station_m") is not None), None),
+            _claimed_tip(journal),
         )
+
+
+def _claimed_tip(journal: list[Mapping[str, Any]]) -> float | None:
+    """The tip's distance from the hub as the mission last remembered it, on a line of its own or beside a transition."""
+    remembered = (line.get("memory") or line for line in reversed(journal))
+    return next((float(one["tip_station_m"]) for one in remembered if one.get("tip_station_m") is not None), None)
 
 
 def _rows(path: Path) -> list[Mapping[str, str]]:
