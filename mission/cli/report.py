@@ -72,6 +72,9 @@ def _measured(summary: Mapping[str, Any]) -> list[str]:
     if summary["coverage"]:
         shares = ", ".join(f"{side} {100 * share:.0f} %" for side, share in summary["coverage"].items())
         lines.append(f"  coverage  {shares}, {summary['frames']} frames")
+    if summary["tip"]["found"]:
+        error = f", {truth['tip_error_m']:.2f} m off in truth" if truth.get("tip_error_m") is not None else ""
+        lines.append(f"  tip       at {summary['tip']['radius_m']:.2f} m from the hub{error}")
     if truth.get("min_clearance_m") is not None:
         lines.append(f"  clearance never under {truth['min_clearance_m']:.2f} m in truth")
     return lines

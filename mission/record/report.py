@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -177,9 +178,12 @@ def _milliseconds(value: float | None) -> str | None:
 
 
 def _reasons(history: RunHistory) -> list[tuple[str, int]]:
-    """Why cycles were refused, most frequent first."""
+    """Why cycles were refused, most frequent first; reasons that differ in their numbers alone are one."""
     counted = Counter(
-        reason for line in history.cycles if not line.get("accepted") for reason in line.get("reasons") or ()
+        re.sub(r"[-+]?\d+(?:\.\d+)?", "…", reason)
+        for line in history.cycles
+        if not line.get("accepted")
+        for reason in line.get("reasons") or ()
     )
     return counted.most_common(10)
 
