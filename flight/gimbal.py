@@ -13,7 +13,7 @@ _YAW_IN_EARTH_FRAME = 64
 _YAW_IN_VEHICLE_FRAME = 32
 
 
-def attitude_message(yaw: float, pitch: float) -> dict[str, object]:
+def attitude_message(yaw: float, pitch: float, system: int = 1) -> dict[str, object]:
     """Fields of GIMBAL_MANAGER_SET_ATTITUDE for a yaw from north and a pitch from the horizon, radians.
 
     PX4's manager takes this message unacknowledged at any rate, as MAVSDK's own streaming mode sends it; each
@@ -21,7 +21,7 @@ def attitude_message(yaw: float, pitch: float) -> dict[str, object]:
     """
     cy, sy, cp, sp = cos(yaw / 2), sin(yaw / 2), cos(pitch / 2), sin(pitch / 2)
     return {
-        "target_system": 1,
+        "target_system": system,
         "target_component": 1,
         "flags": _LOCKED,
         "gimbal_device_id": 0,
@@ -58,7 +58,7 @@ class ProcessGimbal:
 
     def at(self, stamp_s: float) -> tuple[float, float]:
         """Yaw and pitch at a time; NaN before the first `point`."""
-        for since_s, start, end in reversed(self._moves):
+        for since_s, start, end in reversed(tuple(self._moves)):
             if since_s <= stamp_s:
                 reach = self._rate * (stamp_s - since_s)
                 yaw, pitch = difference(end[0], start[0]), end[1] - start[1]

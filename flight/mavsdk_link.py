@@ -78,6 +78,7 @@ class MavsdkAutopilot:
         self._mavsdk: Mavsdk | None = None
         self._direct: MavlinkDirect | None = None
         self._system: Any = None
+        self._system_id = 1
         self._loop: asyncio.AbstractEventLoop | None = None
         self._watcher: asyncio.Task[None] | None = None
         self._blocking: set[asyncio.Future[Any]] = set()
@@ -109,6 +110,7 @@ class MavsdkAutopilot:
                     f"no autopilot on {self._address} within {timeout_s:g} s: "
                     "is it powered, and does it send to this port?"
                 )
+            self._system_id = await self._system.get_system_id()
             # The asynchronous wrapper would cost a thread switch per setpoint; the call itself takes 0.3 ms.
             self._direct = MavlinkDirect(self._system._system)
             for name in HANDLERS:
@@ -221,7 +223,7 @@ class MavsdkAutopilot:
             "SET_POSITION_TARGET_LOCAL_NED",
             {
                 "time_boot_ms": self._intake.boot_ms(self._clock.now()),
-                "target_system": 1,
+                "target_system": self._system_id,
                 "target_component": AUTOPILOT,
                 "coordinate_frame": _LOCAL_NED,
                 "type_mask": _POSITION_AND_YAW,
@@ -254,7 +256,7 @@ class MavsdkAutopilot:
         if self._intake.process_gimbal is not None:
             self._intake.process_gimbal.point(self._clock.now(), yaw, pitch)
         else:
-            self._send("GIMBAL_MANAGER_SET_ATTITUDE", attitude_message(yaw, pitch))
+            self._send("GIMBAL_MANAGER_SET_ATTITUDE", attitude_message(yaw, pitch, self._system_id))
 
     def _use_process_gimbal(self) -> None:
         if self._intake.process_gimbal is None:
@@ -264,7 +266,7 @@ class MavsdkAutopilot:
 
     def _on_message(self, message: Any, _: Any) -> None:
         """On the library's thread."""
-        if not self._closing and message.system_id == 1:
+        if not self._closing and message.system_id == self._system_id:
             try:
                 self._intake.receive(message.message_name, message.component_id, json.loads(message.fields_json))
             except (KeyError, TypeError, ValueError) as error:
@@ -276,7 +278,7 @@ class MavsdkAutopilot:
         if self._direct is None:
             raise AutopilotError("the link to the vehicle is closed")
         try:
-            self._direct.send_message(MavlinkMessage(name, 0, 0, 1, AUTOPILOT, json.dumps(fields)))
+            self._direct.send_message(MavlinkMessage(name, 0, 0, self._system_id, AUTOPILOT, json.dumps(fields)))
         except MavlinkDirectError as error:
             raise AutopilotError(f"{name} could not be sent: {error.result.name.lower().replace('_', ' ')}") from None
 
@@ -299,13 +301,14 @@ class MavsdkAutopilot:
                 loop.call_soon_threadsafe(resolve, found)
 
         fields: dict[str, Any] = {
-            "target_system": 1,
+            "target_system": self._system_id,
             "target_component": AUTOPILOT,
             "command": command,
             "confirmation": 0,
         }
         fields |= {f"param{i + 1}": float(parameters[i]) if i < len(parameters) else 0.0 for i in range(7)}
-        direct.send_command_async(MavlinkMessage("COMMAND_LONG", 0, 0, 1, AUTOPILOT, json.dumps(fields)), on_answer)
+        message = MavlinkMessage("COMMAND_LONG", 0, 0, self._system_id, AUTOPILOT, json.dumps(fields))
+        direct.send_command_async(message, on_answer)
         try:
             result = await asyncio.wait_for(answer, _ANSWER_S)
         except TimeoutError:

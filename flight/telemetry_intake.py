@@ -44,7 +44,7 @@ class TelemetryIntake:
     def __init__(self, now: Callable[[], float], on_status_text: Callable[[str, str], None] | None = None) -> None:
         self._now = now
         self._on_status_text = on_status_text
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a listener for status texts may ask for telemetry
         self._stamps: dict[int, StampMap] = {}
         self._last_wall_s = -inf
         self._range: tuple[float, float | None] = (-inf, None)

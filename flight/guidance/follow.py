@@ -32,6 +32,8 @@ Side = Literal["leading", "trailing"]
 Mode = Literal["both", "one", "wrong_side", "none"]
 
 STANDOFF_PID = Pid(p=2.0, i=0.15, d=0.5, limit=1.5, integral_limit=0.4)
+SLOW_M_S = 0.2  # below this the speed is not regulated: the vehicle is to stand
+SPEED_PID = Pid(p=0.0, i=0.25, integral_limit=0.3)
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,7 @@ class FollowSettings:
     yaw_limit: float = np.deg2rad(25.0)
     yaw_rate: float = np.deg2rad(12.0)
     standoff: Pid = STANDOFF_PID
+    speed: Pid = SPEED_PID
     cross_gain: float = 1.2
     gimbal_p: float = 1.0
     gimbal_d: float = 0.05
@@ -73,6 +76,7 @@ class FollowState:
     stamp_s: float | None = None
     standoff: PidState = field(default_factory=PidState)
     speed_m_s: float = 0.0
+    speed: PidState = field(default_factory=PidState)
     yaw: float | None = None
     aim_error: tuple[float, float] | None = None
 
@@ -129,13 +133,18 @@ def follow(estimate: BladeEstimate, pose: VehiclePose, settings: FollowSettings,
     step = settings.acceleration_m_s2 * elapsed
     speed = state.speed_m_s + float(np.clip(wanted_speed - state.speed_m_s, -2 * step, step))
 
+    measured_speed = float(pose.velocity @ along)
+    # The autopilot's gain is not exactly known, and a setpoint is a little old when it is flown: the integral makes up.
+    memory = state.speed if speed > SLOW_M_S else PidState()
+    trim, speed_state = settings.speed.step(speed - measured_speed, elapsed if speed > SLOW_M_S else 0.0, memory)
+
     standoff_error = estimate.nearest_m - settings.standoff_m
     approach, standoff_state = settings.standoff.step(
         standoff_error, elapsed, state.standoff, error_rate=float(pose.velocity @ normal)
     )
     target = (
         pose.position
-        + speed / settings.position_gain * along
+        + (speed + trim) / settings.position_gain * along
         + settings.cross_gain * cross_error * outward
         - approach * normal
     )
@@ -162,8 +171,8 @@ def follow(estimate: BladeEstimate, pose: VehiclePose, settings: FollowSettings,
         mode=aim.mode,
         cross_error_m=cross_error,
         standoff_error_m=standoff_error,
-        speed_m_s=float(pose.velocity @ along),
-        state=FollowState(pose.stamp_s, standoff_state, speed, yaw, error),
+        speed_m_s=measured_speed,
+        state=FollowState(pose.stamp_s, standoff_state, speed, speed_state, yaw, error),
     )
 
 

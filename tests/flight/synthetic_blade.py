@@ -42,9 +42,9 @@ class SyntheticBlade:
     def nearest(self, lens):
         """Distance from a point of local NED to the nearest point of the surface, on a fine grid around it."""
         s0 = self.frame.to_blade(lens)[0]
-        s = np.linspace(s0 - 2, s0 + 2, 81)[:, None]
+        s = np.linspace(s0 - 1.5, s0 + 1.5, 31)[:, None]
         leading, trailing = self.edges(s)
-        n = trailing + (leading - trailing) * np.linspace(0, 1, 81)[None, :]
+        n = trailing + (leading - trailing) * np.linspace(0, 1, 31)[None, :]
         points = np.stack([np.broadcast_to(s, n.shape), n, self.depth(s, n)], axis=-1)
         return float(np.min(np.linalg.norm(points - self.frame.to_blade(lens), axis=-1)))
 

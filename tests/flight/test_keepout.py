@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from flight.keepout import KeepOut
 from flight.turbine import Turbine
-from tests.flight.synthetic_blade import SyntheticBlade, facing
+from tests.flight.synthetic_blade import PointMass, SyntheticBlade, facing
 from vision.capture import rotation_of
 
 SURE = Turbine(np.array([60.0, 10.0, -78.0]), 0.4, 0.6, hub_sigma_m=0.0, heading_sigma=0.0)
@@ -158,6 +158,19 @@ class TestMeasuredSurface:
         blade = SyntheticBlade(self.true.blade_frame())
         near = facing(blade, self.true.heading, station, 1.8).position
         assert volume.inside(near)
+
+    @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+    def test_three_metres_are_allowed_at_either_side_of_a_twisted_chord(self, share):
+        """Where one edge lies half a metre before the other, each side is followed at its own distance."""
+        blade = SyntheticBlade(self.true.blade_frame())
+        leading, trailing = blade.edges(9.0)
+        offset = trailing + share * (leading - trailing)
+        at = blade.frame.to_ned(np.array([9.0, offset, blade.depth(9.0, offset) - 3.15]))
+        vehicle = PointMass(at, self.true.heading, np.array([self.true.heading, 0.0]))
+        volume = VOLUME
+        for _ in range(50):
+            volume = volume.with_blade_surface(blade.estimate(0.0, vehicle.camera()), 0.1)
+        assert not volume.inside(at)
 
     def test_trust_grows_slowly_and_never_from_uncertain_or_old_estimates(self):
         at = facing(SyntheticBlade(self.true.blade_frame()), self.true.heading, 15.0, 3.0).position
