@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Parameters(BaseModel):
     """Base of every behaviour's parameters: frozen, nothing unknown; fields carry units, limits and text."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class NoParameters(Parameters):

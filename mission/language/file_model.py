@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 class FileModel(BaseModel):
     """Base of the files' models. Fields carry their unit in the name, their limits and their documentation."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 Vector = tuple[float, float, float]
