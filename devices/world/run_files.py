@@ -72,7 +72,7 @@ class RunFiles:
 
 
 def _claimed_tip(journal: list[Mapping[str, Any]]) -> float | None:
-    """The tip's distance from the hub as the mission last remembered it, on a line of its own or beside a transition."""
+    """The tip's distance from the hub as last remembered, on a line of its own or beside a transition."""
     remembered = (line.get("memory") or line for line in reversed(journal))
     return next((float(one["tip_station_m"]) for one in remembered if one.get("tip_station_m") is not None), None)
 
