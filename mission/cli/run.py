@@ -74,6 +74,10 @@ def run(
     resumed = _interrupted_run(resume, record)
     overrides = list(changes or []) + ([f"world.seed={seed}"] if seed is not None else [])
     mission = _mission(file, resumed, overrides, rig)
+    if resumed is not None:
+        from mission.executive.resume import interrupted
+
+        interrupted(resumed.journal, mission)  # refuse what cannot be gone on with before a folder is made
     _may_fly(mission, speed=speed, lockstep=lockstep, system=system, yes=yes)
 
     from mission.record.folder import create
