@@ -29,7 +29,8 @@ class Snapshot:
     since the last accepted observation, or since the watch began; None while nobody watches. seen: something has been
     accepted since then. standoff_m: the distance to the blade that the running behaviour keeps. was_ours: since
     take-off the autopilot has flown in a mode that no pilot chose. laser_fault: the rig's own complaint. home: where
-    the flight began, local NED. side: whose frames are being recorded.
+    the flight began, local NED. side: whose frames are being recorded. speed: of mission
+    time, in mission seconds per wall second.
     """
 
     now: float
@@ -48,6 +49,7 @@ class Snapshot:
     laser_on: bool = False
     laser_fault: str | None = None
     side: str | None = None
+    speed: float = 1.0
 
     @property
     def clearance_m(self) -> float | None:
@@ -108,7 +110,8 @@ def take(
         vision_age_s=getattr(perception, "vision_age_s", None),
         seen=accepted_s is not None and (watched_s is None or accepted_s >= watched_s),
         needs_vision=needs_vision,
-        streaming=setpoints.target is not None,
+        streaming=bool(getattr(setpoints, "streaming", setpoints.target is not None)),
+        speed=services.clock.speed,
         standoff_m=standoff_m,
         was_ours=was_ours,
         home=services.memory.home,

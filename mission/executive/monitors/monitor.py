@@ -24,7 +24,8 @@ class Monitor:
     excess: how far the limit is exceeded: positive when it is, None where that cannot be told (it changes nothing).
     event: raised once when it has been exceeded for `persist_s` without a break. rearm: how far the excess must fall
     below zero before the event may be raised again. restored: the event raised then. limit: the field of `limits:` that
-    it watches. airborne: watched in the air alone.
+    it watches. airborne: watched in the air alone. wall: it persists in wall seconds, because what it
+    waits for does not go faster when mission time does.
     """
 
     event: str
@@ -35,6 +36,7 @@ class Monitor:
     rearm: float
     restored: str | None
     airborne: bool
+    wall: bool
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ def monitor(
     rearm: float = 0.0,
     restored: str | None = None,
     airborne: bool = True,
+    wall: bool = False,
 ) -> Callable[[Excess], Excess]:
     """Register a function as the monitor that raises `event`. Its docstring is what users read."""
 
@@ -65,7 +68,7 @@ def monitor(
             if name is not None and name not in EVENTS:
                 raise ValueError(f"monitor {excess.__name__}: event {name!r} is not in the event table")
         text = " ".join((excess.__doc__ or "").split())
-        _REGISTRY[event] = Monitor(event, limit, text, excess, persist_s, rearm, restored, airborne)
+        _REGISTRY[event] = Monitor(event, limit, text, excess, persist_s, rearm, restored, airborne, wall)
         return excess
 
     return register
@@ -94,6 +97,7 @@ def look(entry: Monitor, watch: Watch, snapshot: Snapshot) -> tuple[Watch, str |
     if excess <= 0:
         return Watch(), None
     since = snapshot.now if watch.since_s is None else watch.since_s
-    if snapshot.now - since + 1e-6 < entry.persist_s:
+    patience = entry.persist_s * snapshot.speed if entry.wall else entry.persist_s
+    if snapshot.now - since + 1e-6 < patience:
         return Watch(since, False, max(excess, watch.worst)), None
     return Watch(since, True, max(excess, watch.worst)), entry.event

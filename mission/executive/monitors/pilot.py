@@ -19,7 +19,7 @@ def pilot(snapshot: Snapshot) -> float | None:
     return 1.0 if snapshot.was_ours and snapshot.telemetry.flight_mode in STICKS else -1.0
 
 
-@monitor("vehicle_failsafe", persist_s=2.0)
+@monitor("vehicle_failsafe", persist_s=2.0, wall=True)
 def failsafe(snapshot: Snapshot) -> float | None:
     """Setpoints are being sent, yet the autopilot has been flying something else for two seconds.
 

@@ -185,6 +185,12 @@ def test_the_autopilots_own_modes_are_no_failsafe_while_nothing_is_streamed() ->
     assert raised("vehicle_failsafe", landing, 5.0)[0] == []
 
 
+def test_a_handshake_over_a_socket_gets_its_wall_time_however_fast_the_mission_goes() -> None:
+    slow = replace(WELL, telemetry=telemetry(flight_mode="HOLD"), speed=8.0)
+    assert raised("vehicle_failsafe", slow, 15.0)[0] == []
+    assert raised("vehicle_failsafe", slow, 17.0)[0] == ["vehicle_failsafe"]
+
+
 def test_unknown_values_change_nothing() -> None:
     unknown = telemetry(battery_percent=float("nan"), wind=None, position_sigma_m=float("nan"), link_age_s=float("nan"))
     for name in monitors():
