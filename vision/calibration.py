@@ -1,0 +1,296 @@
+"""Stereo calibration from a chessboard seen by both cameras, and how far the result may be trusted.
+
+Few views, or views that are hardly tilted, leave focal length and distance to trade places: the fit looks good and is
+wrong. Then the focal lengths are held at the lens's nominal one instead of being fitted, and the result says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.camchain import stereo_of_opencv
+from vision.camera import Camera, StereoPair
+
+Array = NDArray[np.float64]
+Choice = Literal["auto", "free", "held"]
+
+FEWEST_VIEWS = 3
+WANTED_VIEWS = 10
+WANTED_TILT = np.deg2rad(15)  # spread of the board's tilt among the views
+WANTED_COVERAGE = 0.5
+LARGEST_FOCAL_SIGMA = 0.01  # of the focal length
+NOMINAL_TOLERANCE = 0.03  # by which a lens may differ from its data sheet
+CELLS = (8, 6)
+
+
+class CalibrationError(ValueError):
+    """The data cannot be calibrated from at all; one line for a person."""
+
+
+@dataclass(frozen=True)
+class BoardViews:
+    """Corners of one board seen by both cameras at the same instants.
+
+    image_size (width, height). board (n, 3): the corners on the board, in units of one square. left, right: for each
+    view (n, 2) in pixels, or None where that camera did not see the whole board. square_m: the length of a square where
+    known.
+    """
+
+    image_size: tuple[int, int]
+    board: Array
+    left: tuple[Array | None, ...]
+    right: tuple[Array | None, ...]
+    square_m: float | None = None
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """What the data sheets say: focal length in pixels and distance of the lenses in metres, None where unknown."""
+
+    focal_px: float | None = None
+    baseline_m: float | None = None
+
+
+@dataclass(frozen=True)
+class CameraFit:
+    """One camera. rms_px: reprojection error; view_rms_px (views,) of each view; residuals (n, 2) px of every corner at
+    its place in `corners` (n, 2). focal_sigma_px: of fx as the fit claims, NaN where it was held. tilt (views,): angle
+    in radians between the board's normal and the optical axis. coverage (rows, columns): corners per cell of the
+    image."""
+
+    camera: Camera
+    held: bool
+    rms_px: float
+    view_rms_px: Array
+    corners: Array
+    residuals: Array
+    focal_sigma_px: float
+    tilt: Array
+    coverage: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class StereoFit:
+    """The calibrated pair. epipolar_px: rms distance of corners from the epipolar line of their partner. free: both
+    cameras with nothing held, for comparison; held: the same at the nominal focal length, None where it is unknown.
+    chosen: which of the two the result is built on. warnings: in plain words, why it may not be trusted. square_m:
+    length of a square, from the board or from the nominal baseline."""
+
+    stereo: StereoPair
+    left: CameraFit
+    right: CameraFit
+    rms_px: float
+    epipolar_px: float
+    free: tuple[CameraFit, CameraFit]
+    held: tuple[CameraFit, CameraFit] | None
+    chosen: Literal["free", "held"]
+    square_m: float
+    scale_from: Literal["board", "baseline"]
+    warnings: tuple[str, ...]
+
+
+def find_corners(image: NDArray[np.uint8], columns: int, rows: int) -> Array | None:
+    """Inner corners (rows * columns, 2) of a chessboard in a picture, row by row, to a fraction of a pixel; None where
+    the whole board is not in view."""
+    grey = image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+    found, corners = cv2.findChessboardCornersSB(grey, (columns, rows), flags=cv2.CALIB_CB_ACCURACY)
+    return np.asarray(corners, float).reshape(-1, 2) if found else None
+
+
+def board_points(columns: int, rows: int) -> Array:
+    """The corners (rows * columns, 3) of a board in units of one square, row by row."""
+    v, u = np.mgrid[0:rows, 0:columns]
+    return np.column_stack([u.ravel(), v.ravel(), np.zeros(rows * columns)]).astype(float)
+
+
+def fit_camera(
+    board: Array, views: Sequence[Array], image_size: tuple[int, int], focal_px: float | None = None
+) -> CameraFit:
+    """One camera from its views (n, 2) each; with `focal_px` the focal length is held there, the principal point at the
+    image centre and tangential distortion at zero.
+
+    Raises: CalibrationError: too few views, or none that a camera could have seen.
+    """
+    if len(views) < FEWEST_VIEWS:
+        raise CalibrationError(
+            f"{len(views)} views of the board; at least {FEWEST_VIEWS} are needed, {WANTED_VIEWS} wanted"
+        )
+    width, height = image_size
+    guess = focal_px or 1.0 * width
+    matrix = np.array([[guess, 0, (width - 1) / 2], [0, guess, (height - 1) / 2], [0, 0, 1.0]])
+    flags = cv2.CALIB_FIX_K3
+    if focal_px is not None:
+        flags |= cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_FOCAL_LENGTH | cv2.CALIB_FIX_PRINCIPAL_POINT
+        flags |= cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K2
+    points = [np.asarray(view, np.float32).reshape(-1, 1, 2) for view in views]
+    try:
+        rms, matrix, distortion, turns, shifts, deviations, _, per_view = cv2.calibrateCameraExtended(
+            [np.asarray(board, np.float32)] * len(views), points, (width, height), matrix, np.zeros(5), flags=flags
+        )
+    except cv2.error as error:
+        raise CalibrationError(f"no camera could have seen these corners ({error.err})") from None
+    k1, k2, p1, p2 = np.asarray(distortion, float).ravel()[:4]
+    camera = Camera(
+        width,
+        height,
+        float(matrix[0, 0]),
+        float(matrix[1, 1]),
+        float(matrix[0, 2]),
+        float(matrix[1, 2]),
+        (float(k1), float(k2), float(p1), float(p2)),
+    )
+    corners = np.concatenate([np.asarray(view, float).reshape(-1, 2) for view in views])
+    drawn = [
+        cv2.projectPoints(board, turn, shift, matrix, distortion)[0].reshape(-1, 2)
+        for turn, shift in zip(turns, shifts, strict=True)
+    ]
+    normals = np.array([cv2.Rodrigues(turn)[0][:, 2] for turn in turns])
+    return CameraFit(
+        camera,
+        focal_px is not None,
+        float(rms),
+        np.asarray(per_view, float).ravel(),
+        corners,
+        np.concatenate(drawn) - corners,
+        float("nan") if focal_px is not None else float(np.asarray(deviations).ravel()[0]),
+        np.arccos(np.clip(np.abs(normals[:, 2]), 0, 1)),
+        _coverage(corners, image_size),
+    )
+
+
+def calibrate_stereo(views: BoardViews, nominal: Nominal | None = None, choice: Choice = "auto") -> StereoFit:
+    """Both cameras and the rigid motion between them, rotation kept.
+
+    choice: 'free' fits the focal lengths, 'held' keeps the nominal one, 'auto' takes 'free' unless its data are badly
+    conditioned.
+
+    Raises: CalibrationError: too few views, no scale, or 'held' without a nominal focal length.
+    """
+    nominal = nominal or Nominal()
+    if choice == "held" and nominal.focal_px is None:
+        raise CalibrationError("a held fit needs the nominal focal length (focal length in mm over pixel size in mm)")
+    if views.square_m is None and nominal.baseline_m is None:
+        raise CalibrationError(
+            "the size of a square is unknown, and so is the nominal baseline: one of them gives the scale"
+        )
+    sides = (views.left, views.right)
+    seen = [[corners for corners in side if corners is not None] for side in sides]
+    free = tuple(fit_camera(views.board, side, views.image_size) for side in seen)
+    held = None
+    if nominal.focal_px is not None:
+        held = tuple(fit_camera(views.board, side, views.image_size, nominal.focal_px) for side in seen)
+    doubts = _doubts(free[0], free[1], nominal)
+    chosen: Literal["free", "held"] = "held" if choice == "held" or (choice == "auto" and doubts and held) else "free"
+    left, right = held if chosen == "held" and held is not None else free
+    both = [(a, b) for a, b in zip(views.left, views.right, strict=True) if a is not None and b is not None]
+    if not both:
+        raise CalibrationError("no view shows the board to both cameras")
+    rms, rotation, shift = _between(views.board, both, left.camera, right.camera)
+    apart = float(np.linalg.norm(shift))
+    square = views.square_m if views.square_m is not None else (nominal.baseline_m or 0.0) / apart
+    stereo = stereo_of_opencv(left.camera, right.camera, rotation, shift * square)
+    warnings = list(doubts)
+    if views.square_m is None:
+        warnings.append(
+            f"the square's size is not given; the nominal baseline, itself not measured, makes it {square * 1e3:.1f} mm"
+        )
+    elif nominal.baseline_m is not None and abs(stereo.baseline_m / nominal.baseline_m - 1) > 0.05:
+        warnings.append(
+            f"the baseline comes out as {stereo.baseline_m * 1000:.1f} mm, nominal {nominal.baseline_m * 1000:.1f} mm"
+        )
+    if doubts:
+        kept = f"the focal length is held at the nominal {nominal.focal_px:.0f} px" if chosen == "held" else ""
+        warnings.append(kept or "the free fit is used all the same: do not trust its focal lengths")
+    epipolar = epipolar_error(stereo, both)
+    scale_from: Literal["board", "baseline"] = "board" if views.square_m is not None else "baseline"
+    return StereoFit(
+        stereo,
+        left,
+        right,
+        rms,
+        epipolar,
+        (free[0], free[1]),
+        None if held is None else (held[0], held[1]),
+        chosen,
+        square,
+        scale_from,
+        tuple(warnings),
+    )
+
+
+def epipolar_error(stereo: StereoPair, pairs: Sequence[tuple[Array, Array]]) -> float:
+    """Root mean square distance (px of the right image without distortion) of points from their partners' epipolar
+    lines."""
+    t = stereo.translation
+    cross = np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
+    essential = cross @ stereo.rotation
+    off = []
+    for left, right in pairs:
+        lines = stereo.left.rays(left) @ essential.T
+        rays = stereo.right.rays(right)
+        distance = (rays * lines).sum(axis=1) / np.hypot(lines[:, 1], lines[:, 2])
+        off.append(distance * stereo.right.fx)
+    return float(np.sqrt(np.mean(np.square(np.concatenate(off)))))
+
+
+def _between(
+    board: Array, pairs: Sequence[tuple[Array, Array]], left: Camera, right: Camera
+) -> tuple[float, Array, Array]:
+    """rms px, rotation (3, 3) and translation (3,) in squares from left to right in OpenCV's axes, intrinsics as they
+    are."""
+    first, second = ([np.asarray(p[k], np.float32).reshape(-1, 1, 2) for p in pairs] for k in (0, 1))
+    rms, _, _, _, _, rotation, shift, _, _ = cv2.stereoCalibrate(
+        [np.asarray(board, np.float32)] * len(pairs),
+        first,
+        second,
+        left.matrix,
+        np.array(left.distortion),
+        right.matrix,
+        np.array(right.distortion),
+        (left.width, left.height),
+        flags=cv2.CALIB_FIX_INTRINSIC,
+    )
+    return float(rms), np.asarray(rotation, float), np.asarray(shift, float).reshape(3)
+
+
+def _doubts(left: CameraFit, right: CameraFit, nominal: Nominal) -> list[str]:
+    """Why the free fits may not be trusted, in plain words."""
+    doubts = []
+    for name, fit in (("left", left), ("right", right)):
+        focal = fit.camera.fx
+        share = fit.focal_sigma_px / focal
+        if not share < LARGEST_FOCAL_SIGMA:
+            doubts.append(
+                f"the {name} focal length is known to ±{share:.0%} only ({focal:.0f} ± {fit.focal_sigma_px:.0f} px)"
+            )
+        if nominal.focal_px is not None and abs(focal / nominal.focal_px - 1) > NOMINAL_TOLERANCE:
+            doubts.append(f"the {name} focal length comes out as {focal:.0f} px, nominal {nominal.focal_px:.0f} px")
+    if abs(np.log(left.camera.fx / right.camera.fx)) > NOMINAL_TOLERANCE:
+        doubts.append(f"the two focal lengths differ: {left.camera.fx:.0f} and {right.camera.fx:.0f} px")
+    if not doubts:
+        return []
+    tilt = float(np.degrees(max(left.tilt.max(), right.tilt.max())))
+    if np.deg2rad(tilt) < WANTED_TILT:
+        doubts.append(f"the board was tilted by {tilt:.1f}° at most: tilt it by 15 to 45° about both axes")
+    views = min(len(left.tilt), len(right.tilt))
+    if views < WANTED_VIEWS:
+        doubts.append(f"there are only {views} views: take {WANTED_VIEWS} to 30")
+    share = min(float((fit.coverage > 0).mean()) for fit in (left, right))
+    if share < WANTED_COVERAGE:
+        doubts.append(f"the corners cover {share:.0%} of the image only: bring the board into every corner of it")
+    return doubts
+
+
+def _coverage(corners: Array, image_size: tuple[int, int]) -> NDArray[np.int64]:
+    """Corners (rows, columns) in each cell of the image."""
+    columns, rows = CELLS
+    cell = np.clip((corners / image_size * CELLS).astype(int), 0, (columns - 1, rows - 1))
+    counts = np.zeros((rows, columns), np.int64)
+    np.add.at(counts, (cell[:, 1], cell[:, 0]), 1)
+    return counts
