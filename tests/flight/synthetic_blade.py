@@ -97,7 +97,8 @@ class SyntheticBlade:
         """Whether any of the edge beside the camera's station is inside the image."""
         s = self.frame.to_blade(camera.position)[0] + np.linspace(-1.5, 1.5, 61)
         n = self.edges(s)[0 if side == "leading" else 1]
-        pixels = np.array([self._image(camera, a, b) for a, b in zip(s, n, strict=True)])
+        x, y, z = camera.from_ned(self.frame.to_ned(np.stack([s, n, self.depth(s, n)], axis=1))).T
+        pixels = VIEW.focal_px * np.stack([y / x, z / x], axis=1)
         return bool(np.any((abs(pixels[:, 0]) < VIEW.width_px / 2 - 3) & (abs(pixels[:, 1]) < VIEW.height_px / 2 - 3)))
 
 
