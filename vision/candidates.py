@@ -95,18 +95,19 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     normal, rho = normal[keep][:CANDIDATES], rho[keep][:CANDIDATES]
     if len(rho) == 0:
         return []
-    low, high = _beside(dots, normal)
-    for reach, slopes in ((8, 2.4), (4, 0.6)):
-        profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, low, high), reach, slopes)
+    for reach, slopes, samples in ((8, 2.4, 48), (4, 0.6, 96)):
+        low, high = _beside(dots, normal)
+        profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, low, high), reach, slopes, samples)
         normal, rho = profile.normal, profile.rho
         low, high = _beside(dots, normal)
+        beside, support = _support(profile, low, high)
+        if samples < 96:
+            promising = np.flatnonzero((support > 0.6 * LEAST_SUPPORT) & ((dots @ normal.T - rho > 5).mean(axis=0) < 0.2))
+            if len(promising) == 0:
+                return []
+            normal, rho = normal[promising], rho[promising]
     crossed = (dots @ normal.T - rho > 2.5).mean(axis=0)
     on_side = crossed <= blade.strays
-    beside = (profile.t > low[:, None] - 8) & (profile.t < high[:, None] + 8)
-    few = beside.sum(axis=1) < 6
-    beside[few] = True
-    counts = beside.sum(axis=1)
-    support = (profile.agrees & beside).sum(axis=1) / counts
     good = np.flatnonzero(on_side & (support >= LEAST_SUPPORT))
     if len(good) == 0:
         return []
@@ -151,6 +152,13 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
             )
         )
     return found
+
+
+def _support(profile: Profiles, low: Array, high: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which places (k, m) have dots beside them, all where too few have, and the share (k,) of them that agree."""
+    beside = (profile.t > low[:, None] - 8) & (profile.t < high[:, None] + 8)
+    beside[beside.sum(axis=1) < 6] = True
+    return beside, (profile.agrees & beside).sum(axis=1) / beside.sum(axis=1)
 
 
 def _beside(dots: Array, normal: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 NEIGHBOURHOOD = 15  # px, what a dot is compared with; about half the spacing of the grid
 REACH = 5  # px, half the window of the centroid
 LIFT = 48  # grey levels added to the difference, so that noise below zero is not lost
-MOST = 300  # candidates kept, the strongest; the grid has 121 dots
+MOST = 220  # candidates kept, the strongest; the grid has 121 dots
 LARGEST_MOTION = 12.0  # px between laser-off and laser-on
 
 
@@ -64,8 +64,11 @@ def shifted(image: Image, motion: Array) -> Image:
     )
 
 
-def find_spots(off: Image, on: Image) -> Spots:
-    """Spots that are in `on` and not in `off`, both (h, w) uint8 of working size; the strongest MOST of them."""
+def find_spots(off: Image, on: Image, reachable: Image | None = None) -> Spots:
+    """Spots that are in `on` and not in `off`, both (h, w) uint8 of working size; the strongest MOST of them.
+
+    reachable (h, w): not zero where the laser's dots can be at all.
+    """
     motion = motion_between(off, on)
     still = shifted(off, motion) if motion.any() else off
     difference = cv2.addWeighted(on, 1.0, still, -1.0, LIFT)
@@ -76,15 +79,17 @@ def find_spots(off: Image, on: Image) -> Spots:
     smooth = cv2.blur(cv2.blur(difference, (3, 3)), (3, 3))
     response = cv2.subtract(smooth, cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
     typical = float(np.mean(response[::4, ::4]))
-    peaks = _peaks(response, max(2.0, 6.5 * typical))
+    peaks = _peaks(response, max(2.0, 6.5 * typical), reachable)
     return _centroids(on, still, peaks, motion)
 
 
-def _peaks(response: Image, threshold: float) -> NDArray[np.int64]:
+def _peaks(response: Image, threshold: float, reachable: Image | None) -> NDArray[np.int64]:
     """Local maxima (n, 2) (u, v) above a threshold, the strongest first."""
     highest = cv2.dilate(response, np.ones((7, 7), np.uint8))
     _, strong = cv2.threshold(response, threshold, 255, cv2.THRESH_BINARY)
     mask = cv2.bitwise_and(cv2.compare(response, highest, cv2.CMP_EQ), strong)
+    if reachable is not None:
+        mask = cv2.bitwise_and(mask, reachable)
     found = cv2.findNonZero(mask)
     if found is None:
         return np.empty((0, 2), np.int64)
@@ -101,6 +106,7 @@ def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -
         return Spots(np.empty((0, 2)), np.empty(0), np.empty(0), motion)
     reach = np.arange(-REACH, REACH + 1)
     dv, du = np.meshgrid(reach, reach, indexing="ij")
+    x0, y0 = du.astype(np.float32), dv.astype(np.float32)
     v = np.clip(peaks[:, 1, None, None] + dv, 0, height - 1)
     u = np.clip(peaks[:, 0, None, None] + du, 0, width - 1)
     patch = on[v, u].astype(np.float32) - off[v, u].astype(np.float32)
@@ -109,12 +115,12 @@ def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -
     base = np.median(around, axis=1)
     noise = 1.4826 * np.median(np.abs(around - base[:, None]), axis=1) + 0.25
     patch -= base[:, None, None]
-    centre = np.zeros((len(peaks), 2))
+    centre = np.zeros((len(peaks), 2), np.float32)
     for width_px in (2.4, 2.0, 2.0):
-        distance2 = (du - centre[:, 0, None, None]) ** 2 + (dv - centre[:, 1, None, None]) ** 2
-        weight = np.maximum(patch, 0) * np.exp(-0.5 * distance2 / width_px**2)
+        distance2 = (x0 - centre[:, 0, None, None]) ** 2 + (y0 - centre[:, 1, None, None]) ** 2
+        weight = np.maximum(patch, 0) * np.exp(distance2 * np.float32(-0.5 / width_px**2))
         total = weight.sum(axis=(1, 2)) + 1e-6
-        offset = np.stack([(weight * du).sum(axis=(1, 2)), (weight * dv).sum(axis=(1, 2))], axis=1) / total[:, None]
+        offset = np.stack([(weight * x0).sum(axis=(1, 2)), (weight * y0).sum(axis=(1, 2))], axis=1) / total[:, None]
         # a window on a spot of like width halves the offset: twice the step, kept within the patch
         centre = np.clip(centre + 1.7 * (offset - centre), -2.5, 2.5)
     spread2 = 0.5 * (weight * distance2).sum(axis=(1, 2)) / total
@@ -122,7 +128,7 @@ def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -
     strong = slice(0, max(12, len(peaks) // 4))
     width2 = float(np.clip(np.median(spread2[strong]), 0.7, 6.0))
     burnt = off[v, u] > 247
-    centre, level, sigma = _fitted(patch, ~burnt, du, dv, centre, width2, noise)
+    centre, level, sigma = _fitted(patch, ~burnt, x0, y0, centre, width2, noise)
     keep = (level > 0.8 * noise) & (level > 1.2) & (sigma < 0.8)
     uv = peaks + centre
     keep &= _first_of_each(uv, 4.0)
@@ -132,26 +138,26 @@ def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -
 def _fitted(
     patch: NDArray[np.float32],
     usable: NDArray[np.bool_],
-    du: NDArray[np.int64],
-    dv: NDArray[np.int64],
-    centre: Array,
+    du: NDArray[np.float32],
+    dv: NDArray[np.float32],
+    centre: NDArray[np.float32],
     width2: float,
     noise: Array,
 ) -> tuple[Array, Array, Array]:
     """Centre (n, 2), height and standard deviation of the centre of round Gaussian spots of variance `width2` px², by
     Gauss and Newton from `centre`; pixels that are not `usable` (burnt out) do not count."""
-    level = np.zeros(len(patch))
+    level = np.zeros(len(patch), np.float32)
     for step in range(3):
         x, y = du - centre[:, 0, None, None], dv - centre[:, 1, None, None]
         distance2 = x * x + y * y
-        shape = np.exp(-0.5 * distance2 / width2)
-        use = usable * np.exp(-0.5 * distance2 / (2.5 * width2))
+        shape = np.exp(distance2 * np.float32(-0.5 / width2))
+        use = usable * np.exp(distance2 * np.float32(-0.2 / width2))
         if step == 0:
             level = (use * shape * patch).sum(axis=(1, 2)) / ((use * shape * shape).sum(axis=(1, 2)) + 1e-6)
-        gain = np.maximum(level, 1.0)[:, None, None] / width2
+        gain = (np.maximum(level, 1.0) / np.float32(width2))[:, None, None]
         slopes = np.stack([shape, gain * x * shape, gain * y * shape], axis=1).reshape(len(patch), 3, -1)
         weighted = slopes * use.reshape(len(patch), 1, -1)
-        normal = weighted @ slopes.transpose(0, 2, 1) + 1e-3 * np.eye(3)
+        normal = weighted @ slopes.transpose(0, 2, 1) + np.float32(1e-3) * np.eye(3, dtype=np.float32)
         residual = (patch - level[:, None, None] * shape).reshape(len(patch), -1, 1)
         change = np.linalg.solve(normal, weighted @ residual)[..., 0]
         level = level + change[:, 0]
@@ -159,7 +165,7 @@ def _fitted(
     inverse = np.linalg.inv(normal)
     spread = inverse @ (weighted @ weighted.transpose(0, 2, 1)) @ inverse
     sigma = np.sqrt(0.5 * (spread[:, 1, 1] + spread[:, 2, 2])) * noise
-    return centre, level, np.hypot(sigma, 0.04)
+    return centre.astype(float), level.astype(float), np.hypot(sigma, 0.04).astype(float)
 
 
 def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vision.camera import LaserGrid, StereoPair
+from vision.camera import Camera, LaserGrid, StereoPair
+from vision.capture import Image
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -91,6 +93,22 @@ def expected_points(laser: LaserGrid, depth_m: float, slope: Array) -> Array:
     points = laser.position + reach[:, None] * directions
     points[(reach <= 0) | (points[:, 0] < 0.3)] = np.nan
     return np.asarray(points, float)
+
+
+def reachable(laser: LaserGrid, camera: Camera, rotation: Array, translation: Array, margin_px: int = 5) -> Image:
+    """Mask (h, w), 255 where a dot between NEAREST_M and FARTHEST_M can be in a camera's image.
+
+    rotation (3, 3) and translation (3,) m bring points of the left camera's frame into this camera's.
+    """
+    mask = np.zeros((camera.height, camera.width), np.uint8)
+    distances = 1 / np.linspace(1 / FARTHEST_M, 1 / NEAREST_M, 24)
+    for direction in laser.directions().reshape(-1, 3):
+        points = laser.position + distances[:, None] * direction
+        pixels = camera.project(points @ rotation.T + translation)
+        pixels = pixels[np.isfinite(pixels[:, 0])].clip(-1e4, 1e4)
+        trace = np.rint(pixels * 8).astype(np.int32)
+        cv2.polylines(mask, [trace.reshape(-1, 1, 2)], False, 255, 2 * margin_px + 1, cv2.LINE_8, 3)
+    return mask
 
 
 def match_eyes(

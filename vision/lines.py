@@ -138,7 +138,7 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
 
 @dataclass(frozen=True)
 class Profiles:
-    """K lines, each sampled at SAMPLES places: refined normals (k, 2), rho (k,) signed along them (image frame, px), places
+    """K lines, each sampled at m places: refined normals (k, 2), rho (k,) signed along them (image frame, px), places
     `t` (k, m) along the direction (normal turned by +90°), offset (k, m) px of the step from the refined line, signed step
     (k, m) in grey levels along the normal, and `agrees` (k, m): the step is real and lies on the line. The line is the tangent
     at `focus` (k,) of an edge whose slope changes by `bend` (k,) per px; offsets are from that curve."""
@@ -178,7 +178,7 @@ def visible_stretch(normal: Array, rho: Array, half: Array) -> tuple[Array, Arra
 
 
 def refine_lines(
-    smooth: Image, normal: Array, rho: Array, noise: float, focus: Array, reach: int = REACH, slopes_deg: float = 2.0
+    smooth: Image, normal: Array, rho: Array, noise: float, focus: Array, reach: int = REACH, slopes_deg: float = 2.0, samples: int = SAMPLES
 ) -> Profiles:
     """Lines fitted to the steepest steps across each of K candidate lines, robustly.
 
@@ -188,7 +188,7 @@ def refine_lines(
     height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     start, end = visible_stretch(normal, rho, centre - 3)
-    share = np.linspace(0, 1, SAMPLES)
+    share = np.linspace(0, 1, samples)
     t = start[:, None] + (end - start)[:, None] * share
     direction = np.column_stack([-normal[:, 1], normal[:, 0]])
     across = np.arange(-reach - 1, reach + 2, dtype=float)
@@ -269,5 +269,3 @@ def _weighted_curve(design: Array, offset: Array, weight: Array, before: Array) 
     fit = np.linalg.solve(information, np.einsum("kmi,km->ki", weighted, offset)[..., None])[..., 0]
     good = (weight.sum(axis=1) > 2)[:, None]
     return np.where(good, fit, before), information
-
-

@@ -13,7 +13,7 @@ from vision.chord import chord, heading
 from vision.dots import Spots, find_spots, without_spots
 from vision.candidates import Blade, Candidate, OtherEye, texture_between
 from vision.edges import edge_of, find_edges
-from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser
+from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser, reachable
 from vision.lines import sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
@@ -39,6 +39,13 @@ class Eye:
         self.geometry = geometry
         self.factor = reduction_factor(geometry.stereo.left.width)
         self._stereo = geometry.stereo.shrunk(self.factor)
+        self._reachable: tuple[Image, Image] | tuple[None, None] = (None, None)
+        if geometry.laser is not None:
+            stereo = self._stereo
+            self._reachable = (
+                reachable(geometry.laser, stereo.left, np.eye(3), np.zeros(3)),
+                reachable(geometry.laser, stereo.right, stereo.rotation, stereo.translation),
+            )
 
     def observe(self, frames: StereoFrames) -> BladeObservation:
         """The blade as these frames show it. Never raises on what is in the images; a wrong size is a ValueError."""
@@ -54,8 +61,8 @@ class Eye:
                 images[name] = reduce_image(image, self.factor)
         watch.lap("reduce")
         both = "right" in images and "right_laser" in images
-        left = find_spots(green(images["left"]), green(images["left_laser"]))
-        right = find_spots(green(images["right"]), green(images["right_laser"])) if both else None
+        left = find_spots(green(images["left"]), green(images["left_laser"]), self._reachable[0])
+        right = find_spots(green(images["right"]), green(images["right_laser"]), self._reachable[1]) if both else None
         watch.lap("dots")
         laser = self.geometry.laser
         if laser is None:

@@ -56,10 +56,11 @@ def fit_surface(rays: Array, inverse_depth: Array, sigma: Array) -> Surface | No
         return None
     # A point may stand off its neighbours by a little relief of the surface, which no sensor noise explains.
     relief = np.hypot(sigma, 0.002 * inverse_depth)
-    flat, flat_weight, flat_cost = _robust(_terms(rays, 3), inverse_depth, relief)
+    start = _consensus(rays, inverse_depth, relief)
+    flat, flat_weight, flat_cost = _robust(_terms(rays, 3), inverse_depth, relief, start)
     coefficients, weight, count, bent = np.r_[flat, 0, 0, 0], flat_weight, 3, False
     if len(rays) >= 16:
-        curved, curved_weight, curved_cost = _robust(_terms(rays, 6), inverse_depth, relief)
+        curved, curved_weight, curved_cost = _robust(_terms(rays, 6), inverse_depth, relief, np.r_[start, 0, 0, 0])
         free = len(rays) - 6
         reach = np.hypot(rays[:, 1], rays[:, 2]).min()
         if (flat_cost - curved_cost) / 3 > 6 * max(curved_cost / free, 1.0) and reach < 0.08:
@@ -78,16 +79,41 @@ def fit_surface(rays: Array, inverse_depth: Array, sigma: Array) -> Surface | No
     return Surface(1 / a, np.array([-b / a, -c / a]), jacobian @ covariance @ jacobian.T, coefficients, inliers, bent)
 
 
-def _robust(design: Array, values: Array, sigma: Array) -> tuple[Array, Array, float]:
-    """Iteratively reweighted least squares with Cauchy's weights, from the median onward: solution, weights, cost."""
-    scale = 1.4826 * float(np.median(np.abs(values - np.median(values)))) + 1e-9
-    weight = 1 / sigma**2 / (1 + ((values - np.median(values)) / (3 * scale)) ** 2)
-    solution = np.zeros(design.shape[1])
-    for _ in range(8):
+def _consensus(rays: Array, inverse_depth: Array, sigma: Array) -> Array:
+    """The plane (3,) through some dot and its neighbours on which most points lie; of two such planes that share few points,
+    the nearer one if it has at least a third as many."""
+    terms = _terms(rays, 3)
+    apart = np.hypot(rays[:, None, 1] - rays[:, 1], rays[:, None, 2] - rays[:, 2])
+    near = np.argsort(apart, axis=1, kind="stable")[:, : min(9, len(rays))]
+    local, values = terms[near] / sigma[near][..., None], inverse_depth[near] / sigma[near]
+    normal = local.transpose(0, 2, 1) @ local
+    normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    planes = np.linalg.solve(normal, local.transpose(0, 2, 1) @ values[..., None])[..., 0]
+    # A plane through a few neighbours is rough: what counts is to be on the same surface, not within the noise.
+    agrees = np.abs(inverse_depth - planes @ terms.T) < 4 * sigma + 0.02 * inverse_depth
+    count = agrees.sum(axis=1)
+    best = int(np.argmax(count))
+    depth = (agrees * inverse_depth).sum(axis=1) / np.maximum(count, 1)
+    apart_from_best = (agrees & agrees[best]).sum(axis=1) < 0.3 * count
+    rivals = np.flatnonzero(apart_from_best & (count >= max(6, count[best] / 3)) & (depth > 1.1 * depth[best]))
+    chosen = int(rivals[np.argmax(count[rivals])]) if len(rivals) else best
+    members = agrees[chosen]
+    weighted = terms[members] / sigma[members, None] ** 2
+    return np.linalg.solve(
+        weighted.T @ terms[members] + 1e-9 * np.eye(3), weighted.T @ inverse_depth[members]
+    )
+
+
+def _robust(design: Array, values: Array, sigma: Array, start: Array) -> tuple[Array, Array, float]:
+    """Iteratively reweighted least squares with Cauchy's weights, from `start` onward: solution, weights, cost."""
+    solution = start
+    weight = 1 / sigma**2
+    for step in range(6):
+        residual = (values - design @ solution) / sigma
+        loose = 4.0 if step == 0 else 1.5
+        weight = 1 / sigma**2 / (1 + (residual / (2.5 * loose)) ** 2) ** 2
         weighted = design * weight[:, None]
         solution = np.linalg.solve(weighted.T @ design + 1e-12 * np.eye(design.shape[1]), weighted.T @ values)
-        residual = (values - design @ solution) / sigma
-        loose = max(1.4826 * float(np.median(np.abs(residual))), 1.0)
-        weight = 1 / sigma**2 / (1 + (residual / (2.5 * loose)) ** 2)
+    residual = (values - design @ solution) / sigma
     cost = float((np.minimum(np.abs(residual), 5) ** 2).sum())
     return solution, weight, cost

@@ -15,7 +15,8 @@ from vision.observation import FarView
 
 Array = NDArray[np.float64]
 
-ATTITUDE_SIGMA = 0.006  # rad, of the camera's angles as telemetry reports them
+ATTITUDE_SIGMA = 0.004  # rad, of the camera's angles as telemetry reports them, beside the compass's constant error
+COMPASS_SIGMA = np.deg2rad(1.5)
 SAME_PLACE_M = 1.5  # pictures taken nearer to one another than this err together
 OUTLIER = 4.0  # sigmas beyond which a picture contradicts the others
 THIRD = 2 * np.pi / 3
@@ -51,7 +52,7 @@ class HubFix:
 class RotorFix:
     """Hub, azimuths (3,) of the three blades in the rotor's plane (rad, clockwise from up as seen from the front,
     ascending in [0, 2π)) with one sigma, and heading; heading_observed: the pictures told it better than it was known
-    before."""
+    before. compass_error: what all cameras' yaws have too much, rad, as far as pictures from different distances tell."""
 
     hub: HubFix
     azimuths: Array
@@ -61,6 +62,7 @@ class RotorFix:
     heading_observed: bool
     valid: bool
     reasons: tuple[str, ...] = ()
+    compass_error: float = 0.0
 
     def azimuth_near(self, expected: float) -> float:
         """The azimuth of the blade nearest to an expected one: three blades alike cannot be told apart by sight."""
@@ -124,19 +126,20 @@ def locate_rotor(views: Sequence[tuple[CameraPose, FarView]], camera: Camera, be
     def residuals(x: Array, keep: NDArray[np.bool_]) -> Array:
         off = []
         for i in np.flatnonzero(keep):
-            off.append((_seen(camera, poses[i], x[:3]) - hubs[i]) * weights[i])
-            expected = blade_directions(camera, poses[i], x[:3], x[3], x[4], belief.tilt, belief.cone)
+            pose = turned(poses[i], -x[5])
+            off.append((_seen(camera, pose, x[:3]) - hubs[i]) * weights[i])
+            expected = blade_directions(camera, pose, x[:3], x[3], x[4], belief.tilt, belief.cone)
             gap = _wrapped(seen[i][:, None] - expected[None])
             off.append(np.take_along_axis(gap, np.abs(gap).argmin(axis=1)[:, None], 1)[:, 0] * turn_weights[i])
         off.append((x[:3] - belief.hub) / belief.hub_sigma_m)
-        off.append(np.array([_wrapped(x[3] - belief.heading) / belief.heading_sigma]))
+        off.append(np.array([_wrapped(x[3] - belief.heading) / belief.heading_sigma, x[5] / COMPASS_SIGMA]))
         return np.concatenate(off)
 
     # A blade that points up is seen at -90° in the image; the rest of the way is small and found by the fit.
     first = float(np.angle(np.exp(3j * (seen + np.pi / 2)).sum()) / 3)
-    start = np.array([*fix.position, belief.heading, first])
+    start = np.array([*fix.position, belief.heading, first, 0.0])
     x, covariance, used = _fit(residuals, start, fix.used.copy(), 5)
-    miss = np.array([_seen(camera, poses[i], x[:3]) - hubs[i] for i in np.flatnonzero(used)])
+    miss = np.array([_seen(camera, turned(poses[i], -x[5]), x[:3]) - hubs[i] for i in np.flatnonzero(used)])
     reasons = _hub_doubts(x[:3], covariance[:3, :3], used, (belief.hub, belief.hub_sigma_m))
     hub = HubFix(x[:3], covariance[:3, :3], float(np.sqrt(np.mean(miss**2))), used, not reasons, reasons)
     sigma = float(np.sqrt(covariance[4, 4]))
@@ -145,7 +148,13 @@ def locate_rotor(views: Sequence[tuple[CameraPose, FarView]], camera: Camera, be
     azimuths = np.sort((x[4] + THIRD * np.arange(3)) % (2 * np.pi))
     heading_sigma = float(np.sqrt(covariance[3, 3]))
     observed = heading_sigma < 0.7 * belief.heading_sigma
-    return RotorFix(hub, azimuths, sigma, float(_wrapped(x[3])), heading_sigma, observed, not reasons, reasons)
+    heading = float(_wrapped(x[3]))
+    return RotorFix(hub, azimuths, sigma, heading, heading_sigma, observed, not reasons, reasons, float(x[5]))
+
+
+def turned(pose: CameraPose, yaw: float) -> CameraPose:
+    """The pose with the camera turned by `yaw` (rad, clockwise from above) where it is."""
+    return CameraPose(pose.position, rotation_of(0.0, 0.0, yaw) @ pose.rotation, pose.sigma_m)
 
 
 def blade_directions(
