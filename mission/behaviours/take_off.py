@@ -8,9 +8,13 @@ from pydantic import Field
 
 from flight.autopilot import AutopilotError, Setpoint
 from mission.behaviours.behaviour import Parameters, behaviour
+from mission.behaviours.motion import fly_to
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
+
+
+CLIMB_M_S = 1.5
 
 
 class TakeOff(Parameters):
@@ -25,9 +29,17 @@ class TakeOff(Parameters):
     airborne=None,
 )
 async def take_off(services: Services, parameters: TakeOff) -> str:
-    """Arm, climb with the autopilot's own take-off, then take over with setpoints and take control of the gimbal."""
+    """Arm, climb with the autopilot's own take-off, then take over with setpoints and take control of the gimbal.
+
+    A vehicle that is in the air already, as after an interruption, climbs the rest under setpoints; home stays where it
+    took off.
+    """
     autopilot = services.autopilot
     ground = autopilot.telemetry.pose.position.copy()
+    home = services.memory.home
+    if autopilot.telemetry.in_air and home is not None:
+        here = Setpoint(ground.copy(), float(autopilot.telemetry.pose.attitude[2]))
+        return await _climb_on(services, here, home[2] - parameters.height_m)
     services.memory.home = (float(ground[0]), float(ground[1]), float(ground[2]))
     try:
         if not autopilot.telemetry.armed:
@@ -43,4 +55,19 @@ async def take_off(services: Services, parameters: TakeOff) -> str:
         services.progress.text = str(error)
         services.log.warning("take_off", error=str(error))
         return "failed"
+    return "done"
+
+
+async def _climb_on(services: Services, here: Setpoint, down: float) -> str:
+    """The rest of a climb that was interrupted, to `down` m in local NED; never downward."""
+    above = here.position.copy()
+    above[2] = min(down, float(here.position[2]))
+    try:
+        await services.setpoints.start(here)
+        await services.autopilot.take_gimbal()
+    except AutopilotError as error:
+        services.progress.text = str(error)
+        services.log.warning("take_off", error=str(error))
+        return "failed"
+    await fly_to(services, above, here.yaw, speed_m_s=CLIMB_M_S)
     return "done"
