@@ -24,9 +24,8 @@ from mission.language.loading import examine
 from mission.language.location import Location
 from mission.language.quantities import keys
 from mission.language.simulation import Simulation, SimulationError
-from mission.language.sources import read_text, shown
+from mission.language.sources import Sources, mission_root, shown
 from mission.language.tree import Entry, Items, Node, Scalar, Table, kind, plain
-from mission.language.yaml_text import UnreadableError, parse
 
 FIELDS = {
     "mission": "the mission file, seen from this file",
@@ -197,11 +196,10 @@ class _Reader:
         self.problems: list[Diagnostic] = []
 
     def read(self) -> tuple[ScenarioFile | None, tuple[Diagnostic, ...]]:
-        file = shown(self.path)
-        try:
-            table = parse(read_text(self.path), file, self.problems)
-        except UnreadableError as error:
-            return None, (*self.problems, error.diagnostic)
+        sources = Sources(mission_root(self.path), self.problems)
+        table = sources.read(self.path)
+        if table is None:
+            return None, tuple(self.problems)
         for key, entry in table.entries.items():
             if key not in FIELDS:
                 self.report(entry.key, f"a scenario file has no {key!r}", near_or_choices(key, FIELDS))
@@ -222,7 +220,7 @@ class _Reader:
             self.report(table.key_location("mission"), "`mission` must name the mission file")
             return None
         overrides = [text for text, _ in self.texts(table, "set")]
-        path = self.path.parent / name.value
+        path = Path(name.location.file).parent / name.value
         if not path.is_file():
             self.report(name.location, f"the mission file {shown(path)} does not exist")
             return None
