@@ -56,7 +56,7 @@ def schema() -> dict[str, Any]:
         },
         transitions_in.FIELDS,
     )
-    answer = [{"type": "string"}, {"type": "null"}, {**_object(transition), "required": ["to"]}]
+    answer = [{"type": "string"}, {"type": "null"}, _object(transition)]
     definitions["answer"] = {"anyOf": [*answer, {"type": "array", "items": {"anyOf": answer}, "minItems": 1}]}
     definitions["on"] = {
         "type": "object",
