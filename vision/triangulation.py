@@ -15,7 +15,7 @@ from vision.observation import FarView
 
 Array = NDArray[np.float64]
 
-ATTITUDE_SIGMA = 0.004  # rad, of the camera's angles as telemetry reports them, beside the compass's constant error
+ATTITUDE_SIGMA = 0.006  # rad, of the camera's angles as telemetry reports them, beside the compass's constant error
 COMPASS_SIGMA = np.deg2rad(1.5)
 SAME_PLACE_M = 1.5  # pictures taken nearer to one another than this err together
 OUTLIER = 4.0  # sigmas beyond which a picture contradicts the others
@@ -52,7 +52,7 @@ class HubFix:
 class RotorFix:
     """Hub, azimuths (3,) of the three blades in the rotor's plane (rad, clockwise from up as seen from the front,
     ascending in [0, 2π)) with one sigma, and heading; heading_observed: the pictures told it better than it was known
-    before. compass_error: what all cameras' yaws have too much, rad, as far as pictures from different distances tell."""
+    before. compass_error: what all yaws have too much, rad, as far as pictures from different distances tell."""
 
     hub: HubFix
     azimuths: Array
@@ -85,7 +85,9 @@ def locate_hub(
     if used.sum() < (1 if prior is not None else 2):
         start = prior[0] if prior is not None else np.full(3, np.nan)
         sigma = prior[1] if prior is not None else np.inf
-        return HubFix(np.asarray(start, float), np.eye(3) * sigma**2, np.inf, used, False, ("too few bearings",))
+        return HubFix(
+            np.asarray(start, float), np.diag(np.full(3, sigma**2)), np.inf, used, False, ("too few bearings",)
+        )
     start = np.asarray(prior[0], float) if prior is not None else _crossing(poses, pixels, camera)
     weights = _weights(poses, sigmas, camera, start)
 

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 class SurveyTurbine(Parameters):
     """Parameters of `survey_turbine`."""
 
-    distance_m: float = Field(45.0, ge=30, le=80, description="in front of the hub")
-    baseline_m: float = Field(24.0, ge=6, le=60, description="between the outermost viewpoints, to the side")
-    views: int = Field(3, ge=2, le=9, description="viewpoints")
+    distance_m: float = Field(48.0, ge=30, le=80, description="of the two far viewpoints, in front of the hub")
+    baseline_m: float = Field(24.0, ge=6, le=60, description="between these, to the side")
+    near_m: float = Field(30.0, ge=25, le=60, description="distance of a third; it tells the compass's error apart")
     pictures: int = Field(4, ge=1, le=20, description="pictures at each viewpoint")
     speed_m_s: float = Field(6.0, gt=0, le=10, description="speed between the viewpoints")
 
@@ -39,7 +39,7 @@ async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
     for place in _viewpoints(services, parameters):
         sight = services.turbine.hub - place
         yaw = float(np.arctan2(sight[1], sight[0]))
-        services.progress.text = f"to viewpoint {len(sights) // parameters.pictures + 1} of {parameters.views}"
+        services.progress.text = f"to viewpoint {len(sights) // parameters.pictures + 1} of 3"
         await fly_to(services, place, yaw, speed_m_s=parameters.speed_m_s, tolerance_m=1.0)
         for _ in range(parameters.pictures):
             found = await services.perception.far_view()
@@ -64,14 +64,11 @@ async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
 
 
 def _viewpoints(services: Services, parameters: SurveyTurbine) -> list[np.ndarray]:
-    """Places (3,) in local NED on a line across the view, the nearest to the vehicle first."""
+    """Places (3,) in local NED: two far ones on either side of the axis, then a near one on it."""
     turbine = services.turbine
     x, y, _ = turbine.axes()
     front = turbine.hub - parameters.distance_m * x
-    front[2] = turbine.hub[2]
-    steps = np.linspace(-0.5, 0.5, parameters.views) * parameters.baseline_m
-    places = [front + step * y for step in steps]
+    far = [front + side * parameters.baseline_m / 2 * y for side in (-1.0, 1.0)]
     here = services.autopilot.telemetry.pose.position
-    if np.linalg.norm(places[-1] - here) < np.linalg.norm(places[0] - here):
-        places.reverse()
-    return places
+    far.sort(key=lambda place: float(np.linalg.norm(place - here)))
+    return [*far, turbine.hub - parameters.near_m * x]

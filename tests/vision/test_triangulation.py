@@ -106,13 +106,31 @@ def test_exact_views_give_back_hub_and_azimuth_at_any_heading(
     heading: float, azimuth: float, heading_error: float, distance: float
 ) -> None:
     belief = RotorBelief(HUB + np.array([1.0, -1.0, 0.5]), 2.0, heading + heading_error, np.deg2rad(5))
-    views = [(p, view(p, heading, azimuth)) for p in poses(heading, (-0.3 * distance, 0.0, 0.3 * distance), distance)]
-    fix = locate_rotor(views, CAMERA, belief)
+    places = poses(heading, (-0.3 * distance, 0.3 * distance), distance) + poses(heading, (0.0,), 0.5 * distance)
+    fix = locate_rotor([(p, view(p, heading, azimuth)) for p in places], CAMERA, belief)
     assert fix.valid, fix.reasons
     assert np.linalg.norm(fix.hub.position - HUB) < 0.5
     assert abs(np.sin(fix.azimuth_near(azimuth) - azimuth)) < np.deg2rad(0.6)
     assert np.allclose(np.diff(fix.azimuths), 2 * np.pi / 3)
     assert abs(np.sin(fix.heading - heading)) < max(abs(heading_error), 0.01)
+
+
+@pytest.mark.parametrize("error_deg", [-2.0, -1.0, 1.0, 2.0])
+def test_a_compass_that_errs_does_not_shift_the_hub_when_near_and_far_pictures_are_taken(error_deg: float) -> None:
+    rng = np.random.default_rng(4)
+    misses, errors = [], []
+    for _ in range(10):
+        belief = RotorBelief(HUB + rng.normal(0, 1.0, 3), 2.0, 0.14 + rng.normal(0, 0.05), np.deg2rad(5))
+        true = poses(0.14, (-12.0, 12.0), 48.0) * 3 + poses(0.14, (0.0,), 30.0) * 3
+        seen = [(pose, view(pose, 0.14, 0.8, rng)) for pose in true]
+        told = [
+            (CameraPose(p.position, rotation_of(0, 0, np.deg2rad(error_deg)) @ p.rotation, 0.05), v) for p, v in seen
+        ]
+        fix = locate_rotor(told, CAMERA, belief)
+        misses.append(np.linalg.norm((fix.hub.position - HUB)[1:]))
+        errors.append(np.degrees(fix.compass_error) - error_deg)
+    assert np.median(misses) < 0.4 * 48.0 * np.sin(np.deg2rad(abs(error_deg))) + 0.1
+    assert np.median(np.abs(errors)) < 0.4 * abs(error_deg) + 0.1
 
 
 def test_azimuth_keeps_within_its_sigma_with_noisy_views_and_a_wrong_heading() -> None:
