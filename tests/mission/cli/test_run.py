@@ -11,6 +11,7 @@ import pytest
 
 from mission.executive import assembly
 from mission.executive.assembly import FlightError, FlightOptions, FlightResult
+from mission.executive.journal import FORMAT, Journal
 from mission.record.folder import RunFolder
 from tests.mission.cli.conftest import Call
 from tests.mission.cli.program import ROOT
@@ -158,12 +159,29 @@ def test_a_crash_is_one_line_with_its_traceback_in_the_run_s_folder(call: Call, 
 
 
 def test_an_interrupted_run_is_found_by_its_name(call: Call, flights: Any, tmp_path: Path) -> None:
-    asked = flights(ends("aborted", True))
+    def fly(options: FlightOptions) -> FlightResult:
+        journal = Journal(options.folder.journal)
+        journal.append("start", 0.0, format=FORMAT, resumed=False, state="launch", history={}, taken={})
+        journal.close()
+        return FlightResult("aborted", "launch", True)
+
+    asked = flights(fly)
     call("run", BLADE, "--record", tmp_path)
-    call("run", "--resume", "latest", "--record", tmp_path)
+    said = call("run", "--resume", "latest", "--record", tmp_path)
+    assert said.code == 130, said.err
     assert isinstance(asked[1].folder, RunFolder)
     assert asked[1].resume == asked[0].folder.path
     assert asked[1].mission.name == "v80_blade"
+
+
+def test_a_run_that_came_to_its_end_is_not_gone_on_with(call: Call, flights: Any, tmp_path: Path) -> None:
+    asked = flights(ends("completed"))
+    call("run", BLADE, "--record", tmp_path)
+    said = call("run", "--resume", "latest", "--record", tmp_path)
+    said.assert_one_line(2)
+    assert "nothing to go on with" in said.err
+    assert len(asked) == 1
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def a_real_rig(tmp_path: Path) -> Path:

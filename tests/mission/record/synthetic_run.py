@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flight.autopilot import Setpoint, Telemetry, VehiclePose
+from mission.executive.journal import FORMAT
 from mission.record.folder import RunFolder, create
 from mission.record.recorder import RunRecorder
 from mission.record.run_log import RunLog
@@ -36,7 +37,7 @@ states:
 """
 
 JOURNAL = (
-    {"t": 0.0, "kind": "start", "mission": "v80_blade", "version": 1, "resumed": False, "state": "preflight"},
+    {"t": 0.0, "kind": "start", "mission": "v80_blade", "format": FORMAT, "resumed": False, "state": "preflight"},
     {"t": 2.0, "kind": "transition", "event": "passed", "by": "passed", "from": "preflight", "to": "launch"},
     {"t": 14.0, "kind": "transition", "event": "done", "by": "done", "from": "launch", "to": "inspect.survey"},
     {
