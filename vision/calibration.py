@@ -27,6 +27,7 @@ WANTED_COVERAGE = 0.5
 LARGEST_FOCAL_SIGMA = 0.01  # of the focal length
 NOMINAL_TOLERANCE = 0.03  # by which a lens may differ from its data sheet
 CELLS = (8, 6)
+SEARCH_PX = 1000  # the board is looked for in pictures no wider than this
 
 
 class CalibrationError(ValueError):
@@ -99,8 +100,17 @@ def find_corners(image: NDArray[np.uint8], columns: int, rows: int) -> Array | N
     """Inner corners (rows * columns, 2) of a chessboard in a picture, row by row, to a fraction of a pixel; None where
     the whole board is not in view."""
     grey = image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
-    found, corners = cv2.findChessboardCornersSB(grey, (columns, rows), flags=cv2.CALIB_CB_ACCURACY)
-    return np.asarray(corners, float).reshape(-1, 2) if found else None
+    factor = max(1, -(-grey.shape[1] // SEARCH_PX))
+    small = grey if factor == 1 else cv2.resize(grey, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
+    found, rough = cv2.findChessboardCornersSB(small, (columns, rows))
+    if not found:
+        return None
+    corners = np.asarray((np.asarray(rough).reshape(-1, 2) + 0.5) * factor - 0.5, np.float32)
+    spacing = float(np.linalg.norm(np.diff(corners.reshape(rows, columns, 2), axis=1), axis=2).min())
+    reach = int(np.clip(spacing / 4, 2, 15))
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 1e-3)
+    refined = cv2.cornerSubPix(grey, corners.reshape(-1, 1, 2), (reach, reach), (-1, -1), stop)
+    return np.asarray(refined, float).reshape(-1, 2)
 
 
 def board_points(columns: int, rows: int) -> Array:

@@ -1,0 +1,221 @@
+"""Boards and walls as a person stores them: lists of corners or dots in JSON, or folders of pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from mission.cli.errors import CommandError
+
+if TYPE_CHECKING:
+    from vision.calibration import BoardViews, Nominal
+    from vision.calibration_laser import WallDots
+    from vision.camera import LaserGrid, StereoPair
+
+T = TypeVar("T", bound=BaseModel)
+
+LARGEST_FILE = 64 * 1024 * 1024
+PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+
+Point = tuple[float, float]
+Count = Annotated[int, Field(ge=0, le=1000)]
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+
+class DataSheet(_File):
+    """What the lens and the rig were sold as."""
+
+    focal_length_mm: float | None = Field(None, gt=0.1, le=2000)
+    pixel_um: float | None = Field(None, gt=0.1, le=100)
+    baseline_mm: float | None = Field(None, gt=1, le=5000)
+
+
+class CornerFile(_File):
+    """Corners of one board: for each view the same corners in the same order, null where a camera did not see the
+    board."""
+
+    image_size: tuple[Annotated[int, Field(ge=16, le=20000)], Annotated[int, Field(ge=16, le=20000)]]
+    object_points: list[tuple[float, float, float]] = Field(min_length=6)
+    left: list[list[Point] | None]
+    right: list[list[Point] | None]
+    square_mm: float | None = Field(None, gt=0.1, le=10000)
+    nominal: DataSheet = DataSheet()
+
+
+class Wall(_File):
+    """Dots on one wall: row, column, u, v of each, in both eyes."""
+
+    left: list[tuple[Count, Count, float, float]]
+    right: list[tuple[Count, Count, float, float]]
+
+
+class WallFile(_File):
+    """Walls at several distances."""
+
+    walls: list[Wall] = Field(min_length=1)
+
+
+def read_corners(path: Path) -> tuple[BoardViews, DataSheet]:
+    """Corners from a JSON file, with the data sheet that it carries."""
+    from vision.calibration import BoardViews
+
+    file = _validated(CornerFile, path)
+    count = len(file.object_points)
+    if len(file.left) != len(file.right):
+        raise CommandError(f"{path}: left has {len(file.left)} views and right {len(file.right)}; both need the same")
+    for side in ("left", "right"):
+        for number, view in enumerate(getattr(file, side)):
+            if view is not None and len(view) != count:
+                raise CommandError(f"{path}: {side}[{number}] has {len(view)} corners, object_points has {count}")
+    square = None if file.square_mm is None else file.square_mm / 1000
+    sides = [tuple(None if view is None else np.array(view) for view in side) for side in (file.left, file.right)]
+    return BoardViews(file.image_size, np.array(file.object_points), sides[0], sides[1], square), file.nominal
+
+
+def find_boards(folder: Path, board: str) -> BoardViews:
+    """Corners of a board (`9x6`: inner corners across and down) in a folder's pictures: left/NAME and right/NAME, or
+    left_NAME and right_NAME."""
+    from vision.calibration import BoardViews, board_points, find_corners
+
+    columns, rows = _board_size(board)
+    sides: dict[str, list[Any]] = {"left": [], "right": []}
+    size: tuple[int, int] | None = None
+    pairs = _pairs(folder)
+    for pair in pairs:
+        for side, path in zip(sides, pair, strict=True):
+            image = _picture(path)
+            here = (image.shape[1], image.shape[0])
+            if size is not None and here != size:
+                raise CommandError(f"{path}: {here[0]} x {here[1]} px, the others are {size[0]} x {size[1]}")
+            size = here
+            sides[side].append(find_corners(image, columns, rows))
+    seen = {side: sum(corners is not None for corners in found) for side, found in sides.items()}
+    if min(seen.values()) == 0 or size is None:
+        raise CommandError(
+            f"{folder}: no board of {columns} x {rows} inner corners found "
+            f"({seen['left']} of {len(pairs)} left, {seen['right']} right pictures); is --board right?"
+        )
+    return BoardViews(size, board_points(columns, rows), tuple(sides["left"]), tuple(sides["right"]))
+
+
+def read_walls(source: Path, stereo: StereoPair, laser: LaserGrid) -> list[WallDots]:
+    """Dots from a JSON file, or from a folder with one folder of pictures (left, right, left_laser, right_laser) a
+    wall."""
+    if source.is_dir():
+        return _seen_walls(source, stereo, laser)
+    walls = _validated(WallFile, source).walls
+    return [_common(wall.left, wall.right, laser, f"{source}: walls[{number}]") for number, wall in enumerate(walls)]
+
+
+def nominal_of(sheet: DataSheet, focal_mm: float | None, pixel_um: float | None, baseline_mm: float | None) -> Nominal:
+    """The data sheet with what the command line says instead."""
+    from vision.calibration import Nominal
+
+    focal, pixel = focal_mm or sheet.focal_length_mm, pixel_um or sheet.pixel_um
+    baseline = baseline_mm or sheet.baseline_mm
+    if (focal is None) != (pixel is None):
+        raise CommandError("the nominal focal length needs both --focal-mm and --pixel-um")
+    focal_px = focal / pixel * 1000 if focal is not None and pixel is not None else None
+    return Nominal(focal_px, None if baseline is None else baseline / 1000)
+
+
+def _validated(model: type[T], path: Path) -> T:
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise CommandError(f"{path}: too large")
+        return model.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise CommandError(f"{path}: {place}: {first['msg'][:1].lower()}{first['msg'][1:]}") from None
+
+
+def _board_size(text: str) -> tuple[int, int]:
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(part.isdigit() and 3 <= int(part) <= 100 for part in parts):
+        raise CommandError(f"--board {text!r}: inner corners across x down, as in 9x6")
+    return int(parts[0]), int(parts[1])
+
+
+def _pairs(folder: Path) -> list[tuple[Path, Path]]:
+    """Left and right pictures of the same name, sorted."""
+    if not folder.is_dir():
+        raise CommandError(f"{folder}: neither a folder of pictures nor a .json file of corners")
+    found: dict[str, dict[str, Path]] = {"left": {}, "right": {}}
+    for path in sorted(folder.rglob("*")):
+        if path.suffix.lower() not in PICTURES:
+            continue
+        for side, names in found.items():
+            if path.parent.name == side:
+                names[path.stem] = path
+            elif path.stem.startswith(side):
+                names[path.stem[len(side) :]] = path
+    both = sorted(set(found["left"]) & set(found["right"]))
+    if not both:
+        raise CommandError(f"{folder}: no pairs of pictures: left/NAME and right/NAME, or left_NAME and right_NAME")
+    return [(found["left"][name], found["right"][name]) for name in both]
+
+
+def _picture(path: Path) -> Any:
+    import cv2
+
+    data = np.frombuffer(path.read_bytes(), np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+    if image is None:
+        raise CommandError(f"{path}: not a picture that can be read")
+    return image
+
+
+def _seen_walls(folder: Path, stereo: StereoPair, laser: LaserGrid) -> list[WallDots]:
+    from vision.camera import RigGeometry
+    from vision.capture import StereoFrames
+    from vision.pipeline import Eye
+
+    eye = Eye(RigGeometry(stereo, laser))
+    walls = []
+    for place in sorted(path for path in folder.iterdir() if path.is_dir()):
+        images = []
+        for name in ("left", "right", "left_laser", "right_laser"):
+            path = next((place / f"{name}{end}" for end in PICTURES if (place / f"{name}{end}").exists()), None)
+            if path is None:
+                raise CommandError(f"{place}: {name}.png is missing; a wall needs left, right, left_laser, right_laser")
+            images.append(_picture(path))
+        try:
+            seen = eye.observe(StereoFrames(0.0, *images))
+        except ValueError as error:
+            raise CommandError(f"{place}: {error}") from None
+        if seen.dots_left is None or seen.dots_right is None:
+            raise CommandError(f"{place}: no dots: {'; '.join(seen.reasons) or 'too few were found'}")
+        sides: list[list[Any]] = [
+            list(zip(dots.row.tolist(), dots.column.tolist(), *dots.uv.T.tolist(), strict=True))
+            for dots in (seen.dots_left, seen.dots_right)
+        ]
+        walls.append(_common(sides[0], sides[1], laser, str(place)))
+    if not walls:
+        raise CommandError(f"{folder}: no folders of walls in it, one with four pictures for each wall")
+    return walls
+
+
+def _common(
+    left: list[tuple[int, int, float, float]],
+    right: list[tuple[int, int, float, float]],
+    laser: LaserGrid,
+    what: str,
+) -> WallDots:
+    """The dots of one wall that both eyes saw."""
+    from vision.calibration_laser import WallDots
+
+    one, other = ({(row, column): (u, v) for row, column, u, v in dots} for dots in (left, right))
+    both = sorted(set(one) & set(other))
+    beyond = next((dot for dot in both if dot[0] >= laser.rows or dot[1] >= laser.columns), None)
+    if beyond is not None:
+        raise CommandError(f"{what}: dot {beyond} lies outside a grid of {laser.rows} rows and {laser.columns} columns")
+    index = np.array(both, np.int64).reshape(-1, 2)
+    pixels = (np.array([side[dot] for dot in both], float).reshape(-1, 2) for side in (one, other))
+    return WallDots(index[:, 0], index[:, 1], *pixels)
