@@ -47,7 +47,7 @@ async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
             if found.view.valid:
                 sights.append(found)
             await services.clock.sleep(0.3)
-    refined = services.locate(sights)
+    refined = await services.clock.work(services.locate, sights)
     if refined is None:
         services.progress.text = "the pictures do not agree on a rotor"
         return "not_found"
