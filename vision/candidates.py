@@ -44,7 +44,7 @@ class OtherEye:
     surface: Surface
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """A refined line with its outward normal and offset (image frame, working px) and what speaks for it.
 
@@ -145,7 +145,7 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
                 float(blocked[k]),
                 empty,
                 beyond,
-                _run(profile.t[k], profile.agrees[k], float(profile.focus[k])),
+                run_of(profile, k),
                 float(value),
                 profile,
                 k,
@@ -174,8 +174,9 @@ def _typical_step(profile: Profiles, beside: NDArray[np.bool_]) -> Array:
     return np.asarray(np.nanmedian(steps, axis=1), float)
 
 
-def _run(t: Array, agrees: NDArray[np.bool_], focus: float) -> tuple[float, float]:
-    """The places about `focus` between which the steps go on with small gaps."""
+def run_of(profile: Profiles, k: int) -> tuple[float, float]:
+    """The places about its focus between which the steps of line k go on with small gaps."""
+    t, agrees, focus = profile.t[k], profile.agrees[k], float(profile.focus[k])
     share = np.convolve(agrees, np.ones(7) / 7, mode="same") > 0.5
     at = int(np.argmin(np.abs(t - focus)))
     if not share[at]:

@@ -7,13 +7,16 @@ blade has dots on both sides or a weaker step than the edge. The edges of one bl
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.candidates import Blade, Candidate, OtherEye, weigh
+from vision.candidates import Blade, Candidate, OtherEye, run_of, weigh
 from vision.capture import Image
-from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
+from vision.lines import edge_pixels, hough_lines, refine_lines, sensor_noise, smoothed
 from vision.observation import Edge, Line
+from vision.spike import Spike, edges_behind, find_spike
 
 Array = NDArray[np.float64]
 
@@ -22,24 +25,57 @@ LEAST_VALUE = 1.2
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
 
 
-def find_edges(
-    tones: Image, blade: Blade, other: OtherEye | None
-) -> tuple[tuple[Candidate, ...], float, tuple[str, ...]]:
-    """The blade's edges (none, one or two), the direction of its axis modulo π, and reasons where none is found.
+@dataclass(frozen=True)
+class Found:
+    """The blade's edges (none, one or two), the direction of its axis modulo π, NaN where nothing gives it, a spiked tip
+    if there is one, and reasons where there is no edge."""
 
-    tones (h, w, c): working image, free of dots. The axis is NaN where no edge gives it.
-    """
+    edges: tuple[Candidate, ...]
+    axis: float
+    spike: Spike | None
+    reasons: tuple[str, ...]
+
+
+def find_edges(tones: Image, blade: Blade, other: OtherEye | None) -> Found:
+    """The blade's edges and axis. tones (h, w, c): working image, free of dots."""
     height, width = tones.shape[:2]
     noise = sensor_noise(tones)
     lines, _ = hough_lines(edge_pixels(tones, noise), 220, (width, height))
     candidates = weigh(lines, blade, smoothed(tones), noise, other)
     chosen = _choose(candidates)
+    spike = find_spike(candidates, blade.dots) if len(chosen) < 2 else None
+    if spike is not None:
+        behind = edges_behind(candidates, spike, 0.0)
+        reasons = () if behind else ("no edge: only the spiked tip is in view",)
+        return Found(behind, float(np.arctan2(spike.toward[1], spike.toward[0]) % np.pi), spike, reasons)
     if not chosen:
         best = max((c.support for c in candidates), default=0.0)
-        return (), float("nan"), (f"no edge: the best line beside the dots has {best:.0%} support",)
+        return Found((), float("nan"), None, (f"no edge: the best line beside the dots has {best:.0%} support",))
     directions = np.array([np.arctan2(c.outward[1], c.outward[0]) + np.pi / 2 for c in chosen])
     axis = 0.5 * np.angle(np.exp(2j * directions).sum()) % np.pi
-    return chosen, float(axis), ()
+    return Found(chosen, float(axis), None, ())
+
+
+def refocused(edges: tuple[Candidate, ...], tones: Image, station: float, toward: Array) -> tuple[Candidate, ...]:
+    """The edges as they are at a station along `toward` (2,), px: behind a tip, not where it bends them in."""
+    smooth, noise = smoothed(tones), sensor_noise(tones)
+    result = []
+    for edge in edges:
+        direction = edge.profile.direction[edge.index]
+        place = np.array([(station - edge.rho * float(edge.outward @ toward)) / float(direction @ toward)])
+        normal, rho = edge.outward[None], np.array([edge.rho])
+        for reach, slopes in ((8, 6.0), (4, 0.6)):
+            profile = refine_lines(smooth, normal, rho, noise, place, reach, slopes)
+            normal, rho = profile.normal, profile.rho
+        near = np.abs(profile.t[0] - place[0]) < 60
+        turned = float(normal[0] @ edge.outward)
+        if profile.agrees[0][near].mean() > 0.6 and turned > np.cos(np.deg2rad(25)):
+            result.append(
+                replace(edge, outward=normal[0], rho=float(rho[0]), profile=profile, index=0, ends=run_of(profile, 0))
+            )
+        else:
+            result.append(edge)
+    return tuple(result)
 
 
 def _choose(candidates: list[Candidate]) -> tuple[Candidate, ...]:

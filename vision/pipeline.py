@@ -14,14 +14,15 @@ from vision.dots import Spots, find_spots, without_spots
 from vision.candidates import Blade, Candidate, OtherEye, texture_between
 from vision.edges import edge_of, find_edges
 from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser, reachable
-from vision.lines import sensor_noise, smoothed
+from vision.lines import smoothed
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import green, reduce_image, reduction_factor, to_full, tones
 from vision.single import observe_photograph
 from vision.stopwatch import Stopwatch
 from vision.surface import Surface, fit_surface
-from vision.tip import find_tip, tip_of
+from vision.tip import tip_of
+from vision.closing import close
 
 Array = NDArray[np.float64]
 
@@ -112,13 +113,16 @@ class Eye:
         other = None
         if right is not None:
             other = OtherEye(smoothed(tones(images["right_laser"])), self._stereo, surface)
-        edges, axis, reasons = find_edges(clean, around, other)
+        found = find_edges(clean, around, other)
         watch.lap("edges")
-        outline = find_tip(smooth, sensor_noise(clean), edges, axis, dots)
+        edges, outline = close(found, clean, smooth, dots)
+        axis, reasons = found.axis, found.reasons
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]
         width = chord(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
         direction = heading(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
+        if direction is None and found.spike is not None:
+            direction = axis
         sharp = sharpness(clean, edges)
         bright = exposure(images["left"], seeds)
         order = _left_first(edges, axis)
@@ -148,7 +152,7 @@ class Eye:
             edges=tuple(edge_of(edges[k], factor) for k in order),
             tip=tip_of(outline, factor) if outline is not None else None,
             heading=direction,
-            heading_sigma=_heading_sigma(edges),
+            heading_sigma=_heading_sigma(edges) if direction is not None else None,
             chord_m=width[0] if width else None,
             chord_sigma_m=width[1] if width else None,
             sharpness=sharp,
@@ -245,9 +249,9 @@ def _station_near(dots: Array, axis: float) -> Array:
     return along * float(np.clip(0.0, reach.min(), reach.max()))
 
 
-def _heading_sigma(edges: tuple[Candidate, ...]) -> float | None:
+def _heading_sigma(edges: tuple[Candidate, ...]) -> float:
     if not edges:
-        return None
+        return float(np.deg2rad(3.0))
     spread = float(np.sqrt(sum(e.profile.slope_sigma[e.index] ** 2 for e in edges))) / len(edges)
     return float(np.hypot(spread, np.deg2rad(0.2 if len(edges) == 2 else 1.5)))
 

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.closing import close
 from vision.candidates import Blade, Candidate, texture_between
 from vision.capture import Image
 from vision.edges import edge_of, find_edges
@@ -15,7 +16,7 @@ from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import green, reduce_image, reduction_factor, tones
 from vision.stopwatch import Stopwatch
-from vision.tip import find_tip, tip_of
+from vision.tip import tip_of
 
 Array = NDArray[np.float64]
 
@@ -53,9 +54,10 @@ def observe_photograph(image: Image, stamp_s: float = 0.0) -> BladeObservation:
     smooth = smoothed(clean)
     inside = (lattice.absent > 4).all(axis=1) & (lattice.absent < 2 * centre - 4).all(axis=1)
     blade = Blade(seeds - centre, lattice.absent[inside] - centre, texture_between(smooth, seeds), 0.1)
-    edges, axis, reasons = find_edges(clean, blade, None)
+    found = find_edges(clean, blade, None)
     watch.lap("edges")
-    outline = find_tip(smooth, sensor_noise(clean), edges, axis, blade.dots)
+    edges, outline = close(found, clean, smooth, blade.dots)
+    axis, reasons = found.axis, found.reasons
     watch.lap("tip")
     return BladeObservation(
         stamp_s=stamp_s,

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 LANES = 25  # across the blade, from edge to edge
 STEP = 1.5  # px along a lane
+LANE_DOTS = 12.0  # px to each side of a lane within which dots show that the blade goes on
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 BOX, LONG_BOX = 5, 18  # samples averaged on either side of a step, and on either side to tell it from a streak
 
@@ -86,15 +87,17 @@ def _closed_end(
     strip = sampled(smooth, u, v)
     outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
     least = max(4.0, 2.0 * noise, 0.3 * min(edge.step for edge in edges))
-    where, found = _lane_ends(strip, outside, s, least, max(end - 0.35 * wide, _quiet_after(dots, toward)))
+    where, found = _lane_ends(strip, outside, s, least, _quiet_until(lanes, dots, toward, across, first))
     if found.mean() < 0.6:
         return None
     return _outline(lanes, where, found, toward, across, last_dot, border, wide)
 
 
-def _quiet_after(dots: Array, toward: Array) -> float:
-    along = np.sort(dots @ toward)
-    return float(along[-min(4, len(along))]) + 5.0
+def _quiet_until(lanes: Array, dots: Array, toward: Array, across: Array, first: float) -> Array:
+    """How far (lanes,) the blade's own dots reach in each lane: the outline is not before that."""
+    beside = np.abs(dots @ across - lanes[:, None]) < LANE_DOTS
+    reach = np.where(beside, dots @ toward, -np.inf).max(axis=1)
+    return np.maximum(reach + 4.0, first)
 
 
 def _strip(edges: tuple[Candidate, ...], toward: Array, across: Array, dots: Array, end: float) -> tuple[float, float]:
@@ -112,13 +115,13 @@ def _strip(edges: tuple[Candidate, ...], toward: Array, across: Array, dots: Arr
 
 
 def _lane_ends(
-    strip: Array, outside: NDArray[np.bool_], s: Array, least: float, from_s: float
+    strip: Array, outside: NDArray[np.bool_], s: Array, least: float, from_s: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Where each lane (row of `strip`) steps first and clearly after `from_s`, and whether it does."""
     short, long = _change(strip, BOX), _change(strip, LONG_BOX)
     size = np.where(long > 0.5 * short, short, 0.0)[:, BOX:-BOX]
     place = s[BOX : BOX + size.shape[1]] - STEP / 2
-    size[:, place < from_s] = 0
+    size[place < from_s[:, None]] = 0
     size[outside[:, BOX : BOX + size.shape[1]]] = 0
     biggest = size.max(axis=1)
     threshold = np.maximum(0.45 * biggest, least)
@@ -155,22 +158,19 @@ def _outline(
     border: float,
     wide: float,
 ) -> Outline | None:
-    """A convex outline through the lanes' ends, if they make one."""
+    """An outline that rises to one summit and falls, through the lanes' ends, if they make one."""
     x = (lanes - lanes.mean()) / wide
     median = cv2.medianBlur(where.astype(np.float32)[None], 5)[0].astype(float)
-    smooth_lane = found & (np.abs(where - median) < 0.08 * wide + 4)
-    if smooth_lane.mean() < 0.6:
+    agree = found & (np.abs(where - median) < 0.06 * wide + 4)
+    if agree.mean() < 0.6:
         return None
-    weight = smooth_lane.astype(float)
-    design = np.stack([np.ones_like(x), x, x * x], axis=1)
-    for _ in range(5):
-        weighted = design * weight[:, None]
-        fit = np.linalg.lstsq(weighted.T @ design + 1e-9 * np.eye(3), weighted.T @ where, rcond=None)[0]
-        residual = where - design @ fit
-        weight = smooth_lane / (1 + (residual / (0.03 * wide + 1.5)) ** 2) ** 2
-    agree = smooth_lane & (np.abs(residual) < 0.08 * wide + 4)
-    if agree.mean() < 0.6 or fit[2] > 0.5 * wide:
+    summit = int(np.argmax(np.where(agree, median, -np.inf)))
+    rise = np.diff(median) * np.where(np.arange(len(lanes) - 1) < summit, 1, -1)
+    lane_px = wide * 0.88 / (LANES - 1)
+    steady = (rise > -2.0 - 0.3 * lane_px) & (rise < 4.0 * lane_px + 3.0)
+    if steady.mean() < 0.8:
         return None
+    residual = where - median
     outermost = float(np.sort(where[agree])[-min(2, int(agree.sum()))])
     if outermost < last_dot - 4 or outermost > border - 6:
         return None
