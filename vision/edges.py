@@ -20,6 +20,7 @@ from vision.spike import Spike, edges_behind, find_spike
 
 Array = NDArray[np.float64]
 
+FROM_EXPECTED = np.deg2rad(28)  # half the taper, the root's flare, perspective, and what the expectation may be off
 LARGEST_TAPER = np.deg2rad(16)
 LEAST_VALUE = 1.2
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
@@ -36,11 +37,14 @@ class Found:
     reasons: tuple[str, ...]
 
 
-def find_edges(tones: Image, blade: Blade, other: OtherEye | None) -> Found:
-    """The blade's edges and axis. tones (h, w, c): working image, free of dots."""
+def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: float | None = None) -> Found:
+    """The blade's edges and axis. tones (h, w, c): working image, free of dots. expected: direction of the axis in the
+    image (rad, modulo π) where it is known beforehand; lines that run otherwise are then none of the blade's edges."""
     height, width = tones.shape[:2]
     noise = sensor_noise(tones)
     lines, _ = hough_lines(edge_pixels(tones, noise), 220, (width, height))
+    if expected is not None:
+        lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smoothed(tones), noise, other)
     chosen = _choose(candidates)
     spike = find_spike(candidates, blade.dots) if len(chosen) < 2 else None

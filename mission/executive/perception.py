@@ -28,7 +28,7 @@ POSE_WAIT_S = 0.5  # how long a late telemetry pose is waited for before a frame
 class Observer(Protocol):
     """What the loop needs of the vision pipeline."""
 
-    def observe(self, frames: StereoFrames) -> BladeObservation: ...
+    def observe(self, frames: StereoFrames, expected: float | None = None) -> BladeObservation: ...
 
 
 class CycleSink(Protocol):
@@ -44,6 +44,8 @@ class CycleSink(Protocol):
     ) -> None: ...
 
     def gap(self, stamp_s: float, reason: str) -> None: ...
+
+    def photograph(self, frames: StereoFrames, subject: str) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,18 @@ class VisionLoop:
                 )
             return FarSight(await self._clock.work(self._find_rotor, frames.left), pose)
 
+    async def photograph(self, subject: str) -> bool:
+        """One picture without laser, recorded with the pose it was taken from; False when none came."""
+        async with self._busy:
+            try:
+                frames = await self._clock.work(self._rig.capture, False)
+            except CaptureError as error:
+                self._sink.gap(self._clock.now(), str(error))
+                return False
+            pose = await self._pose_at(frames.stamp_s)
+            self._sink.photograph(StereoFrames(frames.stamp_s, frames.left, frames.right, None, None, pose), subject)
+            return True
+
     def watch_blade(self, on: bool) -> None:
         if on and not self._watching:
             self.watching_since_s = self._clock.now()
@@ -179,7 +193,7 @@ class VisionLoop:
         except CaptureError as error:
             self._sink.gap(self._clock.now(), str(error))
             return
-        observation = await self._clock.work(self._eye.observe, frames)
+        observation = await self._clock.work(self._eye.observe, frames, self._expected_axis())
         if self._latency_s:
             await self._clock.sleep(self._latency_s)
         pose = await self._pose_at(frames.stamp_s)
@@ -203,6 +217,11 @@ class VisionLoop:
         self.observation = observation
         async with self._cycle:
             self._cycle.notify_all()
+
+    def _expected_axis(self) -> float:
+        """Direction of the blade's axis in the image, as survey and gimbal have it now: good to a few degrees."""
+        span = self.frame.span @ self.pose_of(self._autopilot.telemetry.pose).rotation
+        return float(np.arctan2(span[2], span[1]))
 
     async def _pose_at(self, stamp_s: float) -> CameraPose | None:
         """The telemetry pose at an exposure; telemetry may still be on its way, so it is waited for a little."""
