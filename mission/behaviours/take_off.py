@@ -37,7 +37,10 @@ async def take_off(services: Services, parameters: TakeOff) -> str:
     autopilot = services.autopilot
     ground = autopilot.telemetry.pose.position.copy()
     home = services.memory.home
-    if autopilot.telemetry.in_air and home is not None:
+    if autopilot.telemetry.in_air:
+        if home is None:
+            services.progress.text = "in the air, and nobody knows where from"
+            return "failed"
         here = Setpoint(ground.copy(), float(autopilot.telemetry.pose.attitude[2]))
         return await _climb_on(services, here, home[2] - parameters.height_m)
     services.memory.home = (float(ground[0]), float(ground[1]), float(ground[2]))

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from mission.executive.services import Memory, Services
 
 
+STATION_STEP_M = 1.0  # the journal is told anew where along the blade it is after so many metres
+
+
 class Chronicle:
     """Writes one run's journal. What behaviours found out goes with the transition that it led to, in one line."""
 
@@ -79,7 +82,7 @@ class Chronicle:
         if memory is not None:
             self._line("memory", **memory)
         station = self._services.progress.station_m
-        if station is not None and round(station, 1) != self._station_m:
+        if station is not None and (self._station_m is None or abs(station - self._station_m) >= STATION_STEP_M):
             self._station_m = round(station, 1)
             self._line("progress", state=state, station_m=self._station_m)
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from mission.executive.clock import Clock
     from mission.executive.services import Services
 
-KEEP_S = 2.0  # how often the journal is told what a behaviour has found out and how far it has come
+KEEP_S = 0.5  # how often the journal is told what a behaviour has found out
 _MOST_FAULTS = 3
 
 
