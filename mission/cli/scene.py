@@ -77,7 +77,8 @@ def take_scene(executive: Executive, rate: VisionRate) -> Scene:
     mission, telemetry = services.mission, services.autopilot.telemetry
     perception: Any = services.perception
     now = services.clock.now()
-    estimate = _quietly(perception.estimate)
+    vision_age_s = getattr(perception, "vision_age_s", None)
+    estimate = _quietly(perception.estimate) if vision_age_s is not None else None
     state = mission.states.get(status.path)
     home = services.memory.home
     wind = telemetry.wind
@@ -100,7 +101,7 @@ def take_scene(executive: Executive, rate: VisionRate) -> Scene:
         sigma_m=estimate.distance_sigma_m if estimate is not None else None,
         target_m=getattr(state.parameters, "standoff_m", None) if state is not None else None,
         nearest_m=estimate.nearest_m if estimate is not None else None,
-        vision_age_s=getattr(perception, "vision_age_s", None),
+        vision_age_s=vision_age_s,
         vision_hz=rate.update(now, getattr(perception, "cycles", 0)),
         battery_percent=telemetry.battery_percent,
         wind_m_s=math.hypot(*wind) if wind is not None else None,

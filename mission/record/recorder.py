@@ -53,6 +53,10 @@ class RunRecorder:
             accepted = update is not None and update.accepted
             self.frames.record(frames, side, estimate, accepted, observation.sharpness)
 
+    def photograph(self, frames: StereoFrames, subject: str) -> None:
+        """A picture of something else than a blade's edge: it counts for no coverage."""
+        self.frames.record(frames, subject, None, accepted=False, sharpness=0.0)
+
     def gap(self, stamp_s: float, reason: str) -> None:
         """A cycle without images."""
         self.vision.gap(stamp_s, reason)

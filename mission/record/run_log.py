@@ -58,6 +58,7 @@ class RunLog:
             cache_logger_on_first_use=False,
         )
         logging.getLogger().addHandler(self._handler)
+        logging.captureWarnings(True)
 
     @property
     def logger(self) -> Any:
@@ -66,6 +67,7 @@ class RunLog:
 
     def close(self) -> None:
         """Write no more; structlog is as it was before."""
+        logging.captureWarnings(False)
         logging.getLogger().removeHandler(self._handler)
         structlog.reset_defaults()
         self._lines.close()

@@ -111,6 +111,8 @@ def _coverage(history: RunHistory) -> Mapping[str, float]:
         return {}
     found: dict[str, list[tuple[float, float]]] = {}
     for line in history.frames:
+        if line["side"] not in ("leading", "trailing"):
+            continue
         stretches = found.setdefault(str(line["side"]), [])
         if line.get("accepted") and (line.get("sharpness") or 0.0) >= SHARP and line.get("edge_m"):
             stretches.append((line["edge_m"][0], line["edge_m"][1]))
