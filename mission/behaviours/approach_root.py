@@ -61,6 +61,8 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
         fresh = estimate is not None and estimate.age_s < 0.7 and estimate.distance_sigma_m < 0.3
         seen_since = (seen_since if seen_since is not None else now) if fresh else None
         services.autopilot.point_gimbal(yaw, 0.0)
+        if estimate is not None and services.setpoints.keep_out is not None:
+            services.setpoints.keep_out = services.setpoints.keep_out.with_blade_surface(estimate, elapsed)
         if estimate is not None and seen_since is not None and now - seen_since >= SEEN_S:
             excess = _excess(estimate, telemetry.range_m, parameters.standoff_m)
             services.progress.text = f"blade at {estimate.nearest_m:.2f} m"
