@@ -18,6 +18,8 @@ CANDIDATES = 28
 LEAST_SUPPORT = 0.5
 INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
+ROUND_M = 1.0  # how far behind the surface before the camera a thick blade's edge may lie
+PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
 PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
 
 
@@ -102,7 +104,9 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
         low, high = _beside(dots, normal)
         beside, support = _support(profile, low, high)
         if samples < 96:
-            promising = np.flatnonzero((support > 0.6 * LEAST_SUPPORT) & ((dots @ normal.T - rho > 5).mean(axis=0) < 0.2))
+            promising = np.flatnonzero(
+                (support > 0.6 * LEAST_SUPPORT) & ((dots @ normal.T - rho > 5).mean(axis=0) < 0.2)
+            )
             if len(promising) == 0:
                 return []
             normal, rho = normal[promising], rho[promising]
@@ -240,19 +244,29 @@ def _parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noi
     height, width = other.smooth.shape[:2]
     lines, places = profile.t.shape
     points = (profile.normal * profile.rho[:, None])[:, None] + profile.t[..., None] * profile.direction[:, None]
-    across = np.arange(-5, 6, dtype=float)
     rays = stereo.left.rays((points + stereo.left.centre).reshape(-1, 2))
     inverse = np.clip((1 - rays[:, 1:] @ surface.slope) / surface.depth_m, 0.02, 1.5)
-    there = stereo.right.project((rays / inverse[:, None]) @ stereo.rotation.T + stereo.translation)
-    far = stereo.right.project(rays @ stereo.rotation.T)
-    shift = ((there - far).reshape(lines, places, 2) * profile.normal[:, None]).sum(axis=2)
-    telling = np.abs(shift).mean(axis=1) > 6.0
-    there = there.reshape(lines, places, 2)
+
+    def seen_at(depth: Array) -> Array:
+        """Pixels (lines, places, 2) of the right eye, for points at depths along the left eye's rays."""
+        return stereo.right.project((rays * depth[:, None]) @ stereo.rotation.T + stereo.translation).reshape(
+            lines, places, 2
+        )
+
+    there, deeper = seen_at(1 / inverse), seen_at(1 / inverse + ROUND_M)
+    far = stereo.right.project(rays @ stereo.rotation.T).reshape(lines, places, 2)
+    normal = profile.normal[:, None]
+    telling = np.abs(((deeper - far) * normal).sum(axis=2)).mean(axis=1) > 6.0
+    behind = ((deeper - there) * normal).sum(axis=2)[..., None]
+    reach = np.linspace(-1.0, 1.0, PARALLAX_SAMPLES)
+    across = np.minimum(behind, 0) + (np.abs(behind) + 2 * PARALLAX_PX) * (reach + 1) / 2 - PARALLAX_PX
     u = there[..., 0, None] + across * profile.normal[:, 0, None, None]
     v = there[..., 1, None] + across * profile.normal[:, 1, None, None]
     gradient = steps(sampled(other.smooth, u, v))
     gradient = (gradient + np.roll(gradient, 1, 1) + np.roll(gradient, -1, 1)) / 3
-    seen = (u[..., 5] > 4) & (v[..., 5] > 4) & (u[..., 5] < width - 5) & (v[..., 5] < height - 5)
+    middle = PARALLAX_SAMPLES // 2
+    seen = (u[..., middle] > 4) & (v[..., middle] > 4)
+    seen &= (u[..., middle] < width - 5) & (v[..., middle] < height - 5)
     seen &= profile.agrees & beside
     like = np.abs(gradient)
     strong = like.max(axis=2) > np.maximum(0.4 * np.abs(profile.step), 1.2 * noise)
