@@ -201,3 +201,14 @@ class TestMeasuredSurface:
         volume = self.followed(self.true, 8.0, 5.0)
         far = self.true.in_front(35.0, 3.9)
         assert volume.inside(far)
+
+    @pytest.mark.parametrize("azimuth_deg", range(0, 360, 45))
+    def test_the_whole_blade_may_be_followed_at_three_metres(self, azimuth_deg):
+        """Neither hub nor tower nor the other blades' disc stand in the way, the blade before the tower included."""
+        turbine = UNSURE.refined(hub_sigma_m=1.0, heading_sigma=np.deg2rad(1.5), azimuth=np.deg2rad(azimuth_deg))
+        blade, volume = SyntheticBlade(turbine.blade_frame()), KeepOut(turbine)
+        for station in (2.6, 5.0, 20.0, 40.0):
+            vehicle = facing(blade, turbine.heading, station, 3.0)
+            for _ in range(35):
+                volume = volume.with_blade_surface(blade.estimate(0.0, vehicle.camera()), 0.1)
+            assert volume.distance(vehicle.position) > 0.25
