@@ -87,11 +87,13 @@ def _tone(state: str) -> str:
     return "good"
 
 
-def over_time(
-    series: Sequence[Series], *, unit: str, band: Sequence[tuple[float, float, float]] = (), rules: Iterable[float] = ()
-) -> str:
-    """Values over mission seconds, with an optional band (seconds, low, high) behind and level lines."""
+Band = Sequence[tuple[float, float, float]]
+
+
+def over_time(series: Sequence[Series], *, unit: str, bands: Sequence[Band] = (), rules: Iterable[float] = ()) -> str:
+    """Values over mission seconds, with bands of (seconds, low, high) behind and level lines."""
     values = [value for line in series for _, value in line.points if value is not None]
+    values += [value for band in bands for _, *ends in band for value in ends]
     times = [at for line in series for at, _ in line.points]
     rules = list(rules)
     if not values:
@@ -102,9 +104,9 @@ def over_time(
     time = Scale(min(times), max(times), LEFT, WIDTH - RIGHT)
     value = Scale(low - margin, high + margin, height - 26, 10)
     parts = _grid_x(time, 10, height - 26) + _grid_y(value, unit)
-    if band:
-        upper = [(time(at), value(min(top, value.high))) for at, _, top in band]
-        lower = [(time(at), value(max(bottom, value.low))) for at, bottom, _ in reversed(band)]
+    for band in bands:
+        upper = [(time(at), value(top)) for at, _, top in band]
+        lower = [(time(at), value(bottom)) for at, bottom, _ in reversed(band)]
         parts.append(f'<polygon class="band" points="{_points([*upper, *lower])}"/>')
     for level in rules:
         parts.append(

@@ -97,7 +97,7 @@ def _standoff(history: RunHistory, summary: Mapping[str, Any]) -> str:
     """The tracked distance while a side was recorded; the line breaks where nothing came for two seconds."""
     distance: list[tuple[float, float | None]] = []
     nearest: list[tuple[float, float | None]] = []
-    band: list[tuple[float, float, float]] = []
+    bands: list[list[tuple[float, float, float]]] = [[]]
     for line in history.cycles:
         estimate = line.get("estimate") or {}
         if not line.get("side") or estimate.get("distance_m") is None:
@@ -106,12 +106,13 @@ def _standoff(history: RunHistory, summary: Mapping[str, Any]) -> str:
         if distance and at - distance[-1][0] > 2.0:
             for series in (distance, nearest):
                 series.append((at, None))
+            bands.append([])
         distance.append((at, metres))
         nearest.append((at, estimate.get("nearest_m")))
-        band.append((at, metres - 2 * sigma, metres + 2 * sigma))
+        bands[-1].append((at, metres - 2 * sigma, metres + 2 * sigma))
     target = summary["standoff"]["target_m"]
     rules = [target] if target is not None else []
-    return over_time([Series("nearest", nearest), Series("distance", distance)], unit=" m", band=band, rules=rules)
+    return over_time([Series("nearest", nearest), Series("distance", distance)], unit=" m", bands=bands, rules=rules)
 
 
 def _side(folder: RunFolder, history: RunHistory, summary: Mapping[str, Any], side: str) -> dict[str, Any]:
