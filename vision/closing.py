@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.candidates import Candidate
+from vision.candidates import Blade, Candidate
 from vision.capture import Image
 from vision.edges import Found, refocused
 from vision.lines import sensor_noise
@@ -18,10 +18,10 @@ SPIKE_SIGMA_PX = 2.0
 
 
 def close(
-    found: Found, clean: Image, smooth: Image, dots: Array
+    found: Found, clean: Image, smooth: Image, blade: Blade
 ) -> tuple[tuple[Candidate, ...], Outline | None]:
     """The edges behind the tip and the tip, None where the blade leaves the image. clean, smooth (h, w, c): working image
-    free of dots, and its 3 × 3 mean. dots (n, 2): of the blade, image frame, working px."""
+    free of dots, and its 3 × 3 mean."""
     edges = found.edges
     if found.spike is not None:
         apex, toward = found.spike.apex, found.spike.toward
@@ -29,10 +29,11 @@ def close(
         if (np.abs(apex) > half - 4).any():
             return edges, None
         return edges, Outline(toward, apex, toward, float(toward @ apex), SPIKE_SIGMA_PX)
-    outline = find_tip(smooth, sensor_noise(clean), edges, found.axis, dots)
+    outline = find_tip(smooth, sensor_noise(clean), edges, found.axis, blade.dots, blade.texture)
     if outline is None:
         return edges, None
     toward = outline.toward
+    dots = blade.dots
     across = np.array([-toward[1], toward[0]])
     tip = float(outline.point @ toward)
     wide = float(np.ptp(dots @ across)) + 20.0

@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 
 FROM_EXPECTED = np.deg2rad(28)  # half the taper, the root's flare, perspective, and what the expectation may be off
 LARGEST_TAPER = np.deg2rad(16)
+LARGEST_FLARE = np.deg2rad(28)  # of the root; so much is believed only where the axis is known
 LEAST_VALUE = 1.2
+PLAIN = 2.5  # times the blade's own texture: a step that needs no other witness to be an edge
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
 
 
@@ -46,7 +48,7 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
     if expected is not None:
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smoothed(tones), noise, other)
-    chosen = _choose(candidates)
+    chosen = _choose(candidates, blade.texture, LARGEST_TAPER if expected is None else LARGEST_FLARE)
     spike = find_spike(candidates, blade.dots) if len(chosen) < 2 else None
     if spike is not None:
         behind = edges_behind(candidates, spike, 0.0)
@@ -82,7 +84,7 @@ def refocused(edges: tuple[Candidate, ...], tones: Image, station: float, toward
     return tuple(result)
 
 
-def _choose(candidates: list[Candidate]) -> tuple[Candidate, ...]:
+def _choose(candidates: list[Candidate], texture: float, largest: float) -> tuple[Candidate, ...]:
     """The pair of nearly parallel candidates that encloses the dots best, or the best one, or none."""
     good = [c for c in candidates if c.value >= LEAST_VALUE]
     if not good:
@@ -91,14 +93,15 @@ def _choose(candidates: list[Candidate]) -> tuple[Candidate, ...]:
     best_pair: tuple[float, tuple[Candidate, ...]] | None = None
     for a in range(len(good)):
         for b in range(a + 1, len(good)):
-            if float(-good[a].outward @ good[b].outward) < np.cos(LARGEST_TAPER):
+            if float(-good[a].outward @ good[b].outward) < np.cos(largest):
                 continue
             total = good[a].value + good[b].value
             if best_pair is None or total > best_pair[0]:
                 best_pair = (total, (good[a], good[b]))
     if best_pair is not None and min(c.value for c in best_pair[1]) > good[0].value - SECOND_EDGE:
         return best_pair[1]
-    return (good[0],)
+    alone = [c for c in good if c.beyond or c.parallax > 0.5 or c.step > PLAIN * texture]
+    return tuple(alone[:1])
 
 
 def edge_of(candidate: Candidate, factor: float) -> Edge:

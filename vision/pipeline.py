@@ -48,8 +48,11 @@ class Eye:
                 reachable(geometry.laser, stereo.right, stereo.rotation, stereo.translation),
             )
 
-    def observe(self, frames: StereoFrames) -> BladeObservation:
-        """The blade as these frames show it. Never raises on what is in the images; a wrong size is a ValueError."""
+    def observe(self, frames: StereoFrames, expected: float | None = None) -> BladeObservation:
+        """The blade as these frames show it. Never raises on what is in the images; a wrong size is a ValueError.
+
+        expected: direction of the blade's axis in the left image, rad modulo π, where tracker or survey know it.
+        """
         watch = Stopwatch()
         missing = [name for name in ("left", "left_laser") if getattr(frames, name) is None]
         if missing:
@@ -90,7 +93,7 @@ class Eye:
             return self._refused(frames, watch, f"{len(blade)} dots, all on one line: no surface")
         blade = blade.take(surface.inliers)
         watch.lap("surface")
-        return self._outlined(frames, images, left, right, rays, matches, blade, surface, watch)
+        return self._outlined(frames, images, left, right, rays, matches, blade, surface, watch, expected)
 
     def _outlined(
         self,
@@ -103,6 +106,7 @@ class Eye:
         blade: Matches,
         surface: Surface,
         watch: Stopwatch,
+        expected: float | None,
     ) -> BladeObservation:
         factor, camera = self.factor, self._stereo.left
         clean = without_spots(tones(images["left_laser"]), tones(images["left"]), left)
@@ -113,9 +117,9 @@ class Eye:
         other = None
         if right is not None:
             other = OtherEye(smoothed(tones(images["right_laser"])), self._stereo, surface)
-        found = find_edges(clean, around, other)
+        found = find_edges(clean, around, other, expected)
         watch.lap("edges")
-        edges, outline = close(found, clean, smooth, dots)
+        edges, outline = close(found, clean, smooth, around)
         axis, reasons = found.axis, found.reasons
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]

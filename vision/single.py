@@ -56,7 +56,7 @@ def observe_photograph(image: Image, stamp_s: float = 0.0) -> BladeObservation:
     blade = Blade(seeds - centre, lattice.absent[inside] - centre, texture_between(smooth, seeds), 0.1)
     found = find_edges(clean, blade, None)
     watch.lap("edges")
-    edges, outline = close(found, clean, smooth, blade.dots)
+    edges, outline = close(found, clean, smooth, blade)
     axis, reasons = found.axis, found.reasons
     watch.lap("tip")
     return BladeObservation(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -25,25 +25,27 @@ BOX, LONG_BOX = 5, 18  # samples averaged on either side of a step, and on eithe
 @dataclass(frozen=True)
 class Outline:
     """The end of the blade: unit vector toward it (2,), the outermost point (2,) on the axis, a line across (outward normal
-    (2,), rho), the standard deviation along the axis; image frame, working px."""
+    (2,), rho), the standard deviation along the axis; image frame, working px. step: its height in grey levels."""
 
     toward: Array
     point: Array
     normal: Array
     rho: float
     sigma_px: float
+    step: float = 0.0
 
 
-def find_tip(smooth: Image, noise: float, edges: tuple[Candidate, ...], axis: float, dots: Array) -> Outline | None:
+def find_tip(
+    smooth: Image, noise: float, edges: tuple[Candidate, ...], axis: float, dots: Array, texture: float
+) -> Outline | None:
     """The tip, or None where the blade leaves the image. dots (n, 2): dots on the blade, image frame, working px."""
     if not edges:
         return None
-    for sign in (1.0, -1.0):
-        toward = sign * np.array([np.cos(axis), np.sin(axis)])
-        outline = _closed_end(smooth, noise, edges, toward, dots)
-        if outline is not None:
-            return outline
-    return None
+    ends = [
+        _closed_end(smooth, noise, edges, sign * np.array([np.cos(axis), np.sin(axis)]), dots, texture)
+        for sign in (1.0, -1.0)
+    ]
+    return max((end for end in ends if end is not None), key=lambda end: end.step, default=None)
 
 
 def _end_of(edge: Candidate, toward: Array) -> tuple[float, float]:
@@ -59,7 +61,7 @@ def _end_of(edge: Candidate, toward: Array) -> tuple[float, float]:
 
 
 def _closed_end(
-    smooth: Image, noise: float, edges: tuple[Candidate, ...], toward: Array, dots: Array
+    smooth: Image, noise: float, edges: tuple[Candidate, ...], toward: Array, dots: Array, texture: float
 ) -> Outline | None:
     height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
@@ -86,11 +88,12 @@ def _closed_end(
     v = s * toward[1] + lanes[:, None] * across[1] + centre[1]
     strip = sampled(smooth, u, v)
     outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
-    least = max(4.0, 2.0 * noise, 0.3 * min(edge.step for edge in edges))
-    where, found = _lane_ends(strip, outside, s, least, _quiet_until(lanes, dots, toward, across, first))
+    least = max(4.0, 2.0 * noise, 0.3 * float(np.mean([edge.step for edge in edges])), 1.2 * texture)
+    where, found, size = _lane_ends(strip, outside, s, least, _quiet_until(lanes, dots, toward, across, first))
     if found.mean() < 0.6:
         return None
-    return _outline(lanes, where, found, toward, across, last_dot, border, wide)
+    outline = _outline(lanes, where, found, toward, across, last_dot, border, wide)
+    return None if outline is None else replace(outline, step=float(np.median(size[found])))
 
 
 def _quiet_until(lanes: Array, dots: Array, toward: Array, across: Array, first: float) -> Array:
@@ -116,10 +119,10 @@ def _strip(edges: tuple[Candidate, ...], toward: Array, across: Array, dots: Arr
 
 def _lane_ends(
     strip: Array, outside: NDArray[np.bool_], s: Array, least: float, from_s: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Where each lane (row of `strip`) steps first and clearly after `from_s`, and whether it does."""
+) -> tuple[Array, NDArray[np.bool_], Array]:
+    """Where each lane (row of `strip`) steps first and clearly after `from_s`, whether it does, and how much."""
     short, long = _change(strip, BOX), _change(strip, LONG_BOX)
-    size = np.where(long > 0.5 * short, short, 0.0)[:, BOX:-BOX]
+    size = np.where((long > 0.5 * short) & (long > 0.7 * least), short, 0.0)[:, BOX:-BOX]
     place = s[BOX : BOX + size.shape[1]] - STEP / 2
     size[place < from_s[:, None]] = 0
     size[outside[:, BOX : BOX + size.shape[1]]] = 0
@@ -137,7 +140,7 @@ def _lane_ends(
     bend = a - 2 * b + c
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = np.where(bend < 0, 0.5 * (a - c) / bend, 0.0)
-    return place[inner] + STEP * np.clip(shift, -1, 1), found
+    return place[inner] + STEP * np.clip(shift, -1, 1), found, biggest
 
 
 def _change(strip: Array, box: int) -> Array:
