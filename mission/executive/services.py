@@ -62,6 +62,10 @@ class Perception(Protocol):
         """Take one picture without laser and look for the rotor; with the pose it was taken from."""
         ...
 
+    async def photograph(self, subject: str) -> bool:
+        """Take one picture without laser and record it under a subject; False when none came."""
+        ...
+
     def watch_blade(self, on: bool) -> None:
         """Start or stop the close-up cycle (laser, stereo, tracker)."""
         ...

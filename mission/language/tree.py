@@ -139,7 +139,7 @@ def kind(node: Node) -> str:
 def merge(below: Table, above: Table) -> Table:
     """`above` laid over `below`, mapping by mapping. Nothing (`~`) in `above` removes what `below` has.
 
-    What `above` adds comes after the key that stands before it there, so that states keep the order of their story.
+    What `above` adds comes after the key that stands before it there (or first), so that states keep their order.
     """
     entries = dict(below.entries)
     before: str | None = None
@@ -160,7 +160,7 @@ def merge(below: Table, above: Table) -> Table:
 
 def _inserted(entries: dict[str, Entry], before: str | None, key: str, entry: Entry) -> dict[str, Entry]:
     if before is None:
-        return {**entries, key: entry}
+        return {key: entry, **entries}
     ordered: dict[str, Entry] = {}
     for name, present in entries.items():
         ordered[name] = present

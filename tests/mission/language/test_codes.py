@@ -82,3 +82,20 @@ def test_only_what_may_be_allowed_can_be_silenced(tmp_path: Path) -> None:
     text = "extends: square.yaml\nstates:\n  square: {on: {battery_low: aborted}}  # allow: M309, it will be fine\n"
     (missions / "example.yaml").write_text(text)
     assert lines_of(examine(missions / "example.yaml").diagnostics) == [("M108", 3), ("M309", 3)]
+
+
+def test_the_mission_in_the_reference_is_a_sound_one(tmp_path: Path) -> None:
+    blocks = re.findall(r"^```yaml\n(.*?)^```", (ROOT / "docs" / "language.md").read_text(), re.MULTILINE | re.DOTALL)
+    missions = Path(shutil.copytree(MISSIONS, tmp_path / "missions"))
+    (missions / "look_around.yaml").write_text(blocks[0])
+    (missions / "scenarios" / "look_around.scenario.yaml").write_text(blocks[1].replace("coverage: complete", "#"))
+    assert lines_of(examine(missions / "look_around.yaml").diagnostics) == []
+    assert report(missions / "scenarios" / "look_around.scenario.yaml").findings == ()
+
+
+def test_the_reference_names_every_key() -> None:
+    from mission.language import loading, states_in, transitions_in
+
+    text = (ROOT / "docs" / "language.md").read_text()
+    for key in {**loading.FIELDS, **states_in.FIELDS, **transitions_in.FIELDS}:
+        assert f"`{key}`" in text, key
