@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 MARGIN_M = 1e-3  # bounded points lie this far outside, so that rounding does not put them inside
 TRUST_S = 3.0  # seconds of good measurement until the measured surface has wholly replaced the survey's
 DISTRUST_S = 20.0  # seconds without it until the survey's is back: longer than any bridge, shorter than GPS drift
+RETREAT_M_S = 0.5  # how fast a trusted surface may move away from the vehicle
 TRUSTED_SIGMA_M = 0.3  # a distance less certain than this opens nothing
 TRUSTED_AGE_S = 1.0
 LOCAL_M = 5.0  # the measured surface holds this far along the blade and fades out over as much again
@@ -101,8 +102,9 @@ class KeepOut:
         tick.
 
         A blade that is nearer than surveyed counts at once. One that is farther opens the way only as trust grows: over
-        three seconds of certain, recent estimates, so that no single wrong distance moves the vehicle into the blade.
-        Trust fades over twenty seconds without such estimates, and the last surface keeps its place meanwhile.
+        three seconds of certain, recent estimates, and then at a limited speed, so that no single wrong distance moves
+        the vehicle into the blade. Trust fades over twenty seconds without such estimates, and the last surface keeps
+        its place meanwhile.
         """
         old = self.surface
         certain = estimate.age_s <= TRUSTED_AGE_S and estimate.distance_sigma_m <= TRUSTED_SIGMA_M
@@ -114,9 +116,11 @@ class KeepOut:
         frame = self.turbine.blade_frame()
         station, _, depth = (float(v) for v in frame.to_blade(estimate.point))
         along, _, inward = (float(v) for v in frame.rotation @ estimate.normal)
-        front = min(0.0, estimate.nearest_m - estimate.distance_m)
+        depth += min(0.0, estimate.nearest_m - estimate.distance_m)
+        if old is not None:
+            depth = min(depth, old.depth_m + old.slope * (station - old.station_m) + RETREAT_M_S * elapsed_s)
         trust = min(1.0, (old.trust if old else 0.0) + elapsed_s / TRUST_S)
-        surface = BladeSurface(station, depth + front, -along / inward, estimate.distance_sigma_m, trust)
+        surface = BladeSurface(station, depth, -along / inward, estimate.distance_sigma_m, trust)
         return replace(self, surface=surface)
 
     def without_blade_surface(self) -> KeepOut:

@@ -178,6 +178,14 @@ class TestMeasuredSurface:
         assert self.followed(self.true, 15.0, 9.0, distance_sigma_m=0.5).inside(at)
         assert self.followed(self.true, 15.0, 9.0, age_s=2.0).inside(at)
 
+    def test_one_wrong_distance_hardly_moves_a_trusted_surface(self):
+        volume = self.followed(self.true, 15.0, 5.0)
+        at = facing(SyntheticBlade(self.true.blade_frame()), self.true.heading, 15.0, 1.9).position
+        estimate, _ = self.estimate(self.true, 15.0)
+        wrong = replace(estimate, point=estimate.point + 2.0 * self.believed.blade_frame().depth)
+        assert volume.inside(at)
+        assert volume.with_blade_surface(wrong, 0.05).inside(at)
+
     def test_a_blade_nearer_than_surveyed_counts_at_once(self):
         at = facing(SyntheticBlade(self.nearer.blade_frame()), self.nearer.heading, 10.0, 1.5).position
         sure = KeepOut(replace(UNSURE, hub_sigma_m=0.3, heading_sigma=0.0))
