@@ -9,20 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from flight import px4_modes
 from flight.autopilot import AutopilotError, Setpoint, Telemetry, VehiclePose
 from flight.gimbal import ProcessGimbal, attitude_message
-from flight.telemetry_intake import AUTOPILOT, HANDLERS, TelemetryIntake
-from flight.udp_port import check_address
-
-if TYPE_CHECKING:
-    from mavsdk.asyncio import Mavsdk
-    from mavsdk.plugins.mavlink_direct import MavlinkDirect
+from flight.mavlink_channel import AUTOPILOT, MavlinkChannel
+from flight.telemetry_intake import HANDLERS, TelemetryIntake
 
 logger = logging.getLogger(__name__)
 
@@ -41,7 +36,6 @@ _CUSTOM_MODE_ENABLED = 1
 _POSITION_AND_YAW = 0b1001_1111_1000  # ignore velocity, acceleration and yaw rate
 _LOCAL_NED = 1
 _STREAM_S = 0.05
-_ANSWER_S = 5.0  # wall seconds; MAVSDK itself gives up on a command after about two
 _MODE_S = 3.0
 _TELEMETRY_S = 10.0
 
@@ -58,7 +52,7 @@ class MavsdkAutopilot:
     """Implements flight.autopilot.Autopilot: `MavsdkAutopilot("udpin://0.0.0.0:14540", clock)`.
 
     simulated: no real vehicle moves. gimbal: 'mavlink', 'process' (a gimbal that exists only here, for autopilots
-    without one), or 'auto', which decides when the gimbal is taken. ground_station: see `connect`.
+    without one), or 'auto', which decides when the gimbal is taken. ground_station: see `MavlinkChannel.open`.
     on_status_text(severity, text) is called on the link's thread."""
 
     def __init__(
@@ -75,46 +69,13 @@ class MavsdkAutopilot:
         self._address, self._clock, self._gimbal_kind = system_address, clock, gimbal
         self._ground_station = ground_station
         self._intake = TelemetryIntake(clock.now, on_status_text)
-        self._mavsdk: Mavsdk | None = None
-        self._direct: MavlinkDirect | None = None
-        self._system: Any = None
-        self._system_id = 1
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._channel = MavlinkChannel(self._intake.receive)
         self._watcher: asyncio.Task[None] | None = None
-        self._blocking: set[asyncio.Future[Any]] = set()
-        self._closing = False
 
     async def connect(self, timeout_s: float) -> None:
-        """Find the vehicle and start telemetry; `timeout_s` is wall time, since an absent vehicle has no other.
-
-        We are a companion computer (1/195), not a ground station: PX4 would count a ground station's heartbeat, which
-        MAVSDK sends from its own thread, as proof that the data link to the operator is alive. The price is that PX4
-        sends no STATUSTEXT; `ground_station` buys it where no other ground station is, as in simulation."""
-        check_address(self._address)
-        from mavsdk import logging as mavsdk_logging
-        from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
-        from mavsdk.plugins.mavlink_direct import MavlinkDirect
-
-        mavsdk_logging.log_subscribe(_swallow)
-        self._loop = asyncio.get_running_loop()
-        kind = ComponentType.GROUND_STATION if self._ground_station else ComponentType.COMPANION_COMPUTER
-        self._mavsdk = Mavsdk(Configuration.create_with_component_type(kind))
+        """Find the vehicle and start telemetry; `timeout_s` is wall time, since an absent vehicle has no other."""
         try:
-            try:
-                await self._mavsdk.add_any_connection(self._address)
-            except Exception as error:
-                raise AutopilotError(f"cannot open {self._address}: {error}") from None
-            self._system = await self._mavsdk.first_autopilot(timeout_s)
-            if self._system is None:
-                raise AutopilotError(
-                    f"no autopilot on {self._address} within {timeout_s:g} s: "
-                    "is it powered, and does it send to this port?"
-                )
-            self._system_id = await self._system.get_system_id()
-            # The asynchronous wrapper would cost a thread switch per setpoint; the call itself takes 0.3 ms.
-            self._direct = MavlinkDirect(self._system._system)
-            for name in HANDLERS:
-                self._direct.subscribe_message(name, self._on_message)
+            await self._channel.open(self._address, timeout_s, HANDLERS, ground_station=self._ground_station)
             await self._request_streams()
             await self._until(lambda: self._intake.heard, _TELEMETRY_S, "the autopilot sends no position and attitude")
         except BaseException:
@@ -124,21 +85,12 @@ class MavsdkAutopilot:
 
     async def close(self) -> None:
         """Stop everything that runs on behalf of the link; idempotent."""
-        self._closing = True
-        if self._watcher is not None:
-            self._watcher.cancel()
+        watcher, self._watcher = self._watcher, None
+        if watcher is not None:
+            watcher.cancel()
             with contextlib.suppress(asyncio.CancelledError):
-                await self._watcher
-            self._watcher = None
-        if self._blocking:
-            # Destroying the library under a call that still waits in a thread is not safe; each gives up by itself.
-            await asyncio.wait(self._blocking, timeout=1.5)
-        mavsdk, self._mavsdk = self._mavsdk, None
-        direct, self._direct = self._direct, None
-        if direct is not None:
-            direct.destroy()
-        if mavsdk is not None:
-            mavsdk.destroy()
+                await watcher
+        await self._channel.close()
 
     @property
     def telemetry(self) -> Telemetry:
@@ -154,12 +106,12 @@ class MavsdkAutopilot:
         from mavsdk.asyncio.plugins.param import ParamAsync
         from mavsdk.plugins.param import ParamError, ParamResult
 
-        plugin = ParamAsync(self._require_system())
+        plugin = ParamAsync(self._channel.system)
         values: dict[str, float] = {}
         for name in names:
             for get in (plugin.get_param_int, plugin.get_param_float):
                 try:
-                    values[name] = float(await self._waiting(get(name)))
+                    values[name] = float(await self._channel.blocking(get(name)))
                     break
                 except ParamError as error:
                     if error.result in (ParamResult.NO_SYSTEM, ParamResult.CONNECTION_ERROR):
@@ -219,11 +171,11 @@ class MavsdkAutopilot:
     def send(self, setpoint: Setpoint) -> None:
         """Send one setpoint once, now. Nothing re-sends it: when the caller stops, the stream stops (dead-man rule)."""
         north, east, down = (float(value) for value in setpoint.position)
-        self._send(
+        self._channel.send(
             "SET_POSITION_TARGET_LOCAL_NED",
             {
                 "time_boot_ms": self._intake.boot_ms(self._clock.now()),
-                "target_system": self._system_id,
+                "target_system": self._channel.system_id,
                 "target_component": AUTOPILOT,
                 "coordinate_frame": _LOCAL_NED,
                 "type_mask": _POSITION_AND_YAW,
@@ -238,7 +190,7 @@ class MavsdkAutopilot:
             self._use_process_gimbal()
             return
         try:
-            result = await self._command(_TAKE_GIMBAL, "take the gimbal", -2, -2, -1, -1)
+            result = await self._channel.command(_TAKE_GIMBAL, "take the gimbal", -2, -2, -1, -1)
         except AutopilotError:
             result = -1
         if result == 0:
@@ -256,66 +208,13 @@ class MavsdkAutopilot:
         if self._intake.process_gimbal is not None:
             self._intake.process_gimbal.point(self._clock.now(), yaw, pitch)
         else:
-            self._send("GIMBAL_MANAGER_SET_ATTITUDE", attitude_message(yaw, pitch, self._system_id))
+            self._channel.send("GIMBAL_MANAGER_SET_ATTITUDE", attitude_message(yaw, pitch, self._channel.system_id))
 
     def _use_process_gimbal(self) -> None:
         if self._intake.process_gimbal is None:
             gimbal = ProcessGimbal()
             gimbal.point(self._clock.now(), float(self.telemetry.pose.attitude[2]), 0.0)
             self._intake.process_gimbal = gimbal
-
-    def _on_message(self, message: Any, _: Any) -> None:
-        """On the library's thread."""
-        if not self._closing and message.system_id == self._system_id:
-            try:
-                self._intake.receive(message.message_name, message.component_id, json.loads(message.fields_json))
-            except (KeyError, TypeError, ValueError) as error:
-                logger.warning("unreadable %s: %s", message.message_name, error)
-
-    def _send(self, name: str, fields: Mapping[str, Any]) -> None:
-        from mavsdk.plugins.mavlink_direct import MavlinkDirectError, MavlinkMessage
-
-        if self._direct is None:
-            raise AutopilotError("the link to the vehicle is closed")
-        try:
-            self._direct.send_message(MavlinkMessage(name, 0, 0, self._system_id, AUTOPILOT, json.dumps(fields)))
-        except MavlinkDirectError as error:
-            raise AutopilotError(f"{name} could not be sent: {error.result.name.lower().replace('_', ' ')}") from None
-
-    async def _command(self, command: int, what: str, *parameters: float) -> int:
-        """MAV_RESULT of a command. Answers come as a callback, so that no thread waits for them."""
-        from mavsdk.plugins.mavlink_direct import MavlinkDirectResult, MavlinkMessage
-
-        loop, direct = asyncio.get_running_loop(), self._direct
-        if direct is None:
-            raise AutopilotError("the link to the vehicle is closed")
-        answer: asyncio.Future[int | None] = loop.create_future()
-
-        def resolve(result: int | None) -> None:
-            if not answer.done():
-                answer.set_result(result)
-
-        def on_answer(outcome: Any, ack: Any, _: Any) -> None:
-            found = json.loads(ack.fields_json).get("result") if outcome is MavlinkDirectResult.SUCCESS else None
-            with contextlib.suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(resolve, found)
-
-        fields: dict[str, Any] = {
-            "target_system": self._system_id,
-            "target_component": AUTOPILOT,
-            "command": command,
-            "confirmation": 0,
-        }
-        fields |= {f"param{i + 1}": float(parameters[i]) if i < len(parameters) else 0.0 for i in range(7)}
-        message = MavlinkMessage("COMMAND_LONG", 0, 0, self._system_id, AUTOPILOT, json.dumps(fields))
-        direct.send_command_async(message, on_answer)
-        try:
-            result = await asyncio.wait_for(answer, _ANSWER_S)
-        except TimeoutError:
-            result = None
-        if result is None:
-            raise AutopilotError(f"{what}: the autopilot does not answer")
-        return result
 
     async def _set_mode(self, mode: str) -> None:
         """PX4 acknowledges a mode twice, first always 'accepted' and then the truth: so the mode itself is waited
@@ -324,7 +223,7 @@ class MavsdkAutopilot:
             return
         main, sub = px4_modes.numbers_of(mode)
         self._intake.mode_answers.clear()
-        result = await self._command(_SET_MODE, f"change to {mode}", _CUSTOM_MODE_ENABLED, main, sub)
+        result = await self._channel.command(_SET_MODE, f"change to {mode}", _CUSTOM_MODE_ENABLED, main, sub)
 
         def settled() -> bool:
             refused = [answer for answer in self._intake.mode_answers if answer != 0]
@@ -341,23 +240,10 @@ class MavsdkAutopilot:
         from mavsdk.plugins.action import ActionError
 
         try:
-            await self._waiting(call(ActionAsync(self._require_system())))
+            await self._channel.blocking(call(ActionAsync(self._channel.system)))
         except ActionError as error:
             answer = error.result.name.lower().replace("_", " ")
             raise AutopilotError(f"{what}: {answer}{self._why()}") from None
-
-    async def _waiting(self, call: Awaitable[Any]) -> Any:
-        """Await a call that blocks a thread, and remember it for `close` even when the caller is cancelled."""
-        future = asyncio.ensure_future(call)
-        self._blocking.add(future)
-        future.add_done_callback(self._blocking.discard)
-        future.add_done_callback(lambda done: None if done.cancelled() else done.exception())
-        return await asyncio.shield(future)
-
-    def _require_system(self) -> Any:
-        if self._system is None or self._mavsdk is None:
-            raise AutopilotError("the link to the vehicle is not open")
-        return self._system
 
     def _why(self) -> str:
         """The vehicle's own last words, where it has any."""
@@ -366,7 +252,9 @@ class MavsdkAutopilot:
     async def _request_streams(self) -> None:
         """Ask for the streams at our rates; one that the autopilot does not have is only missed."""
         for message, interval in _INTERVALS_S.items():
-            result = await self._command(_SET_MESSAGE_INTERVAL, "set a message interval", message, interval * 1e6)
+            result = await self._channel.command(
+                _SET_MESSAGE_INTERVAL, "set a message interval", message, interval * 1e6
+            )
             if result != 0:
                 logger.info("message %d at %.3g s: %s", message, interval, px4_modes.RESULTS.get(result, result))
 
@@ -388,9 +276,3 @@ class MavsdkAutopilot:
                 return
             await asyncio.sleep(0.02)
         raise AutopilotError(complaint)
-
-
-def _swallow(level: Any, message: str, file: str | None, line: int) -> bool:
-    """MAVSDK's own messages go to the run's log, not to the operator's terminal."""
-    logger.debug("mavsdk: %s", message)
-    return True
