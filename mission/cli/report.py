@@ -55,6 +55,8 @@ def told(folder: RunFolder, summary: Mapping[str, Any]) -> list[str]:
         f"  record    {folder.path}",
         f"  report    {folder.report}",
     ]
+    if summary["outcome"] == "unfinished":
+        lines.append(f"  go on     mission run --resume {folder.path}")
     if summary["outcome"] != "completed" and summary.get("why"):
         lines.insert(1, f"  because   {summary['why']}")
     return lines
