@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from mission.executive.decision import Autonomy
     from mission.executive.executive import Executive
     from mission.executive.journal import Journal
-    from mission.executive.question import Ask, Question
     from mission.language.document import Mission
     from mission.record.folder import RunFolder
     from mission.record.recorder import RunRecorder
@@ -137,6 +136,7 @@ def _compose(
     from flight.setpoints import SetpointStream
     from mission.executive.executive import Executive
     from mission.executive.perception import VisionLoop
+    from mission.executive.question import asking
     from mission.executive.services import Services
     from vision.far_view import find_rotor
     from vision.pipeline import Eye
@@ -195,7 +195,7 @@ def _compose(
         services,
         stage.clock,
         journal,
-        ask=_asking(options),
+        ask=asking(options.confirm, at_once=options.lockstep),
         autonomy=options.autonomy,
         resume=None if past is None else where(mission, past, in_air=in_air),
     )
@@ -209,12 +209,3 @@ def _compose(
     if stage.pace is not None:
         beside["pace"] = stage.pace.run()
     return executive, beside
-
-
-def _asking(options: FlightOptions) -> Ask:
-    """Ask on the terminal, in a thread: the flight goes on meanwhile."""
-
-    async def ask(question: Question) -> bool:
-        return await asyncio.to_thread(options.confirm, question.text)
-
-    return ask

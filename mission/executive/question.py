@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from mission.executive.queue import Queued
@@ -24,6 +26,34 @@ class Question:
 
 
 Ask = Callable[[Question], Awaitable[bool]]
+
+
+def asking(confirm: Callable[[str], bool], *, at_once: bool = False) -> Ask:
+    """Ask with a function that waits for a person. It waits in a thread of its own, which nobody waits for: a question
+    that is never answered must not keep a flight from ending. `at_once` (lockstep time): the world waits too."""
+
+    async def ask(question: Question) -> bool:
+        if at_once:
+            return confirm(question.text)
+        loop = asyncio.get_running_loop()
+        answer: asyncio.Future[bool] = loop.create_future()
+
+        def tell(yes: bool) -> None:
+            if not answer.done():
+                answer.set_result(yes)
+
+        def wait() -> None:
+            try:
+                yes = confirm(question.text)
+            except Exception:  # the terminal went away
+                yes = False
+            with suppress(RuntimeError):  # the flight is over
+                loop.call_soon_threadsafe(tell, yes)
+
+        threading.Thread(target=wait, name="question", daemon=True).start()
+        return await answer
+
+    return ask
 
 
 class Questions:

@@ -6,6 +6,7 @@ import asyncio
 import json
 import socket
 import stat
+import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 
 from mission.cli.main import main
 from mission.executive.operator import SOCKET, Answer, OperatorError, flying, serving, tell
+from mission.executive.question import asking
 
 MISSION = {
     "inspect": {
@@ -189,6 +191,47 @@ def test_the_autonomy_decides_what_is_asked(fly: Any, autonomy: str, asked: list
 
     assert fly(ASKING, ask=ask, autonomy=autonomy).run().outcome == "completed"
     assert questions == asked
+
+
+def test_a_person_who_never_answers_does_not_keep_the_flight_from_ending(fly: Any) -> None:
+    gone = threading.Event()
+
+    def confirm(text: str) -> bool:
+        return gone.wait(1000.0)
+
+    flight = fly(ASKING, ask=asking(confirm), autonomy="confirm")
+
+    async def beside(executive: Any) -> None:
+        while executive.status().waiting is None:  # noqa: ASYNC110 (it is the product's own public face)
+            await asyncio.sleep(0.005)
+        executive.interrupt()
+
+    assert flight.run_on_the_wall(beside).outcome == "aborted"
+    assert not gone.is_set()
+    gone.set()
+
+
+@pytest.mark.parametrize("answer", [True, False])
+def test_a_terminal_answers_from_its_own_thread(fly: Any, answer: bool) -> None:
+    asked: list[str] = []
+
+    def confirm(text: str) -> bool:
+        asked.append(text)
+        if not answer:
+            raise EOFError
+        return True
+
+    flight = fly(ASKING, ask=asking(confirm), autonomy="confirm")
+
+    async def beside(executive: Any) -> None:
+        while not asked:  # noqa: ASYNC110 (it is another thread's)
+            await asyncio.sleep(0.005)
+        if not answer:
+            await until(executive, "one")
+            executive.interrupt()
+
+    assert flight.run_on_the_wall(beside).outcome == ("completed" if answer else "aborted")
+    assert asked == ["one: done → two?"]
 
 
 def test_a_safety_event_waits_for_no_answer(fly: Any) -> None:
