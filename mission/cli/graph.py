@@ -22,7 +22,10 @@ def graph(
     form: Annotated[
         Format | None, typer.Option("--format", help="By default from the file's ending, else svg.")
     ] = None,
-    run: Annotated[Path | None, typer.Option(metavar="RUN", help="Paint where this run went: its folder.")] = None,
+    run: Annotated[
+        Path | None, typer.Option(metavar="RUN", help="Paint where this run went: its folder, name or `latest`.")
+    ] = None,
+    record: Annotated[Path, typer.Option(metavar="DIR", help="Where runs leave their folders.")] = Path("logs"),
     changes: Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value.")] = None,
 ) -> None:
     """Draw a mission's states and transitions on one page.
@@ -38,10 +41,12 @@ def graph(
     """
     from mission.cli.errors import CommandError
     from mission.language.document import load
+    from mission.record.folder import open_run
 
     if file is None and run is None:
         raise CommandError("graph: name a mission file, or a run with --run")
-    mission = load(file if file is not None else run / "mission.yaml", changes or ())  # type: ignore[operator]
+    flown = open_run(run, record) if run is not None else None
+    mission = load(file if file is not None else flown.mission, changes or ())  # type: ignore[union-attr]
     chosen = form or (Format.MERMAID if out is not None and out.suffix in (".mmd", ".mermaid", ".md") else Format.SVG)
     if chosen is Format.MERMAID:
         from mission.language.diagram.mermaid import mermaid
@@ -51,7 +56,7 @@ def graph(
         from mission.language.diagram.painting import painting
         from mission.language.diagram.svg import svg
 
-        text = svg(mission, painting(mission, run) if run is not None else None)
+        text = svg(mission, painting(mission, flown.path) if flown is not None else None)
     if out is None:
         print(text, end="")
     else:

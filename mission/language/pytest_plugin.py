@@ -28,7 +28,7 @@ class ScenarioError(Exception):
 
 class _File(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
-        from mission.language.scenario import read
+        from mission.language.scenario_in import read
 
         file, findings = read(self.path)
         if file is None:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from mission.language.diagnostics import Diagnostic
-from mission.language.scenario import Coverage, Result, ScenarioFile, coverage_finding, read
+from mission.language.scenario import Coverage, Result, ScenarioFile, coverage_finding
+from mission.language.scenario_in import read
 from mission.language.sources import shown as shown_path
 
 SUFFIX = ".scenario.yaml"

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from mission.language import loading, states_in, transitions_in
+from mission.language import mission_in, states_in, transitions_in
 from mission.language.document import OUTCOMES
 from mission.language.limits import Limits
 from mission.language.migrations import VERSION
@@ -113,7 +113,7 @@ def schema() -> dict[str, Any]:
             "never": statements,
             "always_eventually": statements,
         },
-        loading.FIELDS,
+        mission_in.FIELDS,
     )
     properties["extends"] = {**_FILES, "description": "missions that this one is laid over"}
     return {

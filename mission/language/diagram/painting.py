@@ -24,14 +24,16 @@ def painting(mission: Mission, run: Path) -> Painting:
         if entry.kind == "transition":
             key = str(entry.fields["key"])
             taken[key] = taken.get(key, 0) + 1
-            _visited(visits, leaf, entry.t - since)
-            leaf, since = str(entry.fields["to"]), entry.t
+            target = str(entry.fields["to"])
+            _visited(visits, leaf, entry.t - since, staying=set(enclosing(target)) - {leaf})
+            leaf, since = target, entry.t
     end = entries[-1].t if entries else 0.0
-    _visited(visits, leaf, end - since)
+    _visited(visits, leaf, end - since, staying=set())
     return Painting(run.resolve().name, visits, taken)
 
 
-def _visited(visits: dict[str, Visit], leaf: str, seconds: float) -> None:
+def _visited(visits: dict[str, Visit], leaf: str, seconds: float, staying: set[str]) -> None:
+    """Add a stay; one in a composite is over when the way leads out of it."""
     for path in enclosing(leaf):
         before = visits.get(path, Visit(0, 0.0))
-        visits[path] = Visit(before.times + 1, before.seconds + seconds)
+        visits[path] = Visit(before.times + (path not in staying), before.seconds + seconds)

@@ -94,8 +94,8 @@ def test_the_mission_in_the_reference_is_a_sound_one(tmp_path: Path) -> None:
 
 
 def test_the_reference_names_every_key() -> None:
-    from mission.language import loading, states_in, transitions_in
+    from mission.language import mission_in, states_in, transitions_in
 
     text = (ROOT / "docs" / "language.md").read_text()
-    for key in {**loading.FIELDS, **states_in.FIELDS, **transitions_in.FIELDS}:
+    for key in {**mission_in.FIELDS, **states_in.FIELDS, **transitions_in.FIELDS}:
         assert f"`{key}`" in text, key

@@ -141,3 +141,22 @@ def test_a_newer_format_is_refused_and_an_older_one_brought_up_to_date(tmp_path:
     old = SMALL.replace("version: 1", "version: 0").replace("timeout_s", "timeout")
     mission = load(written(tmp_path, old, "old.yaml"))
     assert mission.version == 1 and mission.states["launch"].timeout_s == 60
+
+
+def test_a_calibration_is_found_from_the_rig_file_and_from_the_record(tmp_path: Path) -> None:
+    missions = folder(tmp_path)
+    rig = (missions / "rigs" / "simulated.yaml").read_text()
+    section = rig[rig.index("camera:\n  width") : rig.index("laser:")]
+    (missions / "rigs" / "calibrated.yaml").write_text(rig.replace(section, "camchain: camchain.yaml\n"))
+    text = SMALL.replace("rigs/simulated.yaml", "rigs/calibrated.yaml")
+    missing = only(examine(written(tmp_path, text)))
+    assert missing.code == "M101" and missing.location.file.endswith("calibrated.yaml")
+    (missions / "rigs" / "camchain.yaml").write_text("cam0: {}\n")
+    mission = load(written(tmp_path, text))
+    assert mission.rig.camchain == str(missions / "rigs" / "camchain.yaml")
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "mission.yaml").write_text(mission.resolved_yaml)
+    assert [finding.code for finding in examine(run / "mission.yaml").errors] == ["M103"]
+    (run / "journal.jsonl").write_text("")
+    assert load(run / "mission.yaml").rig.camchain == mission.rig.camchain

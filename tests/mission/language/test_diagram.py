@@ -103,3 +103,16 @@ def test_a_painted_diagram_shows_where_a_run_went_and_for_how_long(tmp_path: Pat
     assert painted.visits["home"].seconds == 1.0 and "land" not in painted.visits
     assert painted.taken == {"preflight:passed#0": 1, "launch:done#0": 1, "work:done#0": 1}
     assert "10.5 s" in texts(svg(mission, painted))
+
+
+def test_a_composite_counts_as_one_visit_for_as_long_as_it_is_not_left(tmp_path: Path) -> None:
+    mission = load(MISSIONS / "square.yaml")
+    ways = [(1.0, "square.north", "square.east"), (3.0, "square.east", "square.south"), (6.0, "square.south", "abort")]
+    lines = [{"seq": 0, "t": 0.0, "kind": "transition", "key": "launch:done#0", "from": "launch", "to": "square.north"}]
+    for seq, (at, source, target) in enumerate(ways, 1):
+        to = mission.leaf(target)
+        lines.append({"seq": seq, "t": at, "kind": "transition", "key": "x", "from": source, "to": to})
+    (tmp_path / "journal.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    visits = painting(mission, tmp_path).visits
+    assert (visits["square"].times, visits["square"].seconds) == (1, 6.0)
+    assert (visits["square.east"].times, visits["square.east"].seconds) == (1, 2.0)
