@@ -62,3 +62,10 @@ def test_an_editor_finds_the_mistake(before: str, after: str, validator: Any) ->
     assert before in text
     changed = plain(parse(text.replace(before, after, 1), "file", []))
     assert list(validator.iter_errors(changed)), after
+
+
+@pytest.mark.parametrize("path", sorted(MISSIONS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_shipped_missions_tell_editors_where_the_schema_is(path: Path) -> None:
+    first = path.read_text().splitlines()[0]
+    marker, _, where = first.partition("$schema=")
+    assert marker == "# yaml-language-server: " and (path.parent / where).resolve() == SHIPPED.resolve()
