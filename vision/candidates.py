@@ -14,7 +14,7 @@ from vision.surface import Surface
 
 Array = NDArray[np.float64]
 
-CANDIDATES = 28
+CANDIDATES = 24
 LEAST_SUPPORT = 0.5
 INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on

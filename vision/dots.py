@@ -12,8 +12,8 @@ from vision.capture import Image
 
 Array = NDArray[np.float64]
 
-NEIGHBOURHOOD = 15  # px, what a dot is compared with; about half the spacing of the grid
-REACH = 5  # px, half the window of the centroid
+NEIGHBOURHOOD = 7  # px of the half-size image, what a dot is compared with; about half the spacing of the grid
+REACH = 4  # px, half the window of the centroid
 LIFT = 48  # grey levels added to the difference, so that noise below zero is not lost
 MOST = 220  # candidates kept, the strongest; the grid has 121 dots
 LARGEST_MOTION = 12.0  # px between laser-off and laser-on
@@ -35,19 +35,27 @@ class Spots:
 
 
 def motion_between(off: Image, on: Image) -> Array:
-    """Shift (2,) px that brings the laser-off image onto the laser-on image: by phase correlation of quarter images.
+    """Shift (2,) px that brings the laser-off image onto the laser-on image: by phase correlation of small images.
 
     Zero where the images do not support a shift: it must bring them clearly closer together.
     """
-    small = [cv2.resize(image, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA) for image in (off, on)]
+    return 2 * _motion(_half(off), _half(on))
+
+
+def _half(image: Image) -> Image:
+    return np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _motion(off: Image, on: Image) -> Array:
+    small = [_half(image) for image in (off, on)]
     quiet = _difference(small[0], small[1], np.zeros(2))
     first, second = (image.astype(np.float32) for image in small)
     window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
     shift, _ = cv2.phaseCorrelate(first, second, window)
     motion = np.array(shift)
-    if np.hypot(*motion) * 4 > LARGEST_MOTION or np.hypot(*motion) * 4 < 0.2:
+    if not 0.05 < np.hypot(*motion) < LARGEST_MOTION / 4:
         return np.zeros(2)
-    return motion * 4 if _difference(small[0], small[1], motion) < 0.9 * quiet else np.zeros(2)
+    return motion * 2 if _difference(small[0], small[1], motion) < 0.9 * quiet else np.zeros(2)
 
 
 def _difference(off: Image, on: Image, shift: Array) -> float:
@@ -59,43 +67,48 @@ def _difference(off: Image, on: Image, shift: Array) -> float:
 def shifted(image: Image, motion: Array) -> Image:
     """The image moved by (right, down) px."""
     transform = np.array([[1.0, 0.0, motion[0]], [0.0, 1.0, motion[1]]])
-    return cv2.warpAffine(
+    moved = cv2.warpAffine(
         image, transform, (image.shape[1], image.shape[0]), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
+    return np.asarray(moved, np.uint8)
 
 
 def find_spots(off: Image, on: Image, reachable: Image | None = None) -> Spots:
     """Spots that are in `on` and not in `off`, both (h, w) uint8 of working size; the strongest MOST of them.
 
-    reachable (h, w): not zero where the laser's dots can be at all.
+    reachable (h, w): not zero where the laser's dots can be at all. Spots are found in images of half the size and
+    measured in the whole ones.
     """
-    motion = motion_between(off, on)
-    still = shifted(off, motion) if motion.any() else off
-    difference = cv2.addWeighted(on, 1.0, still, -1.0, LIFT)
+    small_off, small_on = _half(off), _half(on)
+    motion = 2 * _motion(small_off, small_on)
+    still = off
     if motion.any():
-        margin = int(np.ceil(np.abs(motion).max())) + 1
+        small_off, still = shifted(small_off, motion / 2), shifted(off, motion)
+    difference = cv2.addWeighted(small_on, 1.0, small_off, -1.0, LIFT)
+    if motion.any():
+        margin = int(np.ceil(np.abs(motion).max() / 2)) + 1
         for border in (difference[:margin], difference[-margin:], difference[:, :margin], difference[:, -margin:]):
             border[:] = LIFT
-    smooth = cv2.blur(cv2.blur(difference, (3, 3)), (3, 3))
-    response = cv2.subtract(smooth, cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
-    typical = float(np.mean(response[::4, ::4]))
-    peaks = _peaks(response, max(2.0, 6.5 * typical), reachable)
-    return _centroids(on, still, peaks, motion)
+    response = cv2.subtract(cv2.blur(difference, (3, 3)), cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
+    typical = float(np.mean(response[::3, ::3]))
+    return _centroids(on, still, _peaks(np.asarray(response, np.uint8), max(2.0, 6.0 * typical), reachable), motion)
 
 
 def _peaks(response: Image, threshold: float, reachable: Image | None) -> NDArray[np.int64]:
-    """Local maxima (n, 2) (u, v) above a threshold, the strongest first."""
-    highest = cv2.dilate(response, np.ones((7, 7), np.uint8))
+    """Local maxima above a threshold in the half-size response: (n, 2) (u, v) of the whole image, the strongest first."""
+    highest = cv2.dilate(response, np.ones((5, 5), np.uint8))
     _, strong = cv2.threshold(response, threshold, 255, cv2.THRESH_BINARY)
     mask = cv2.bitwise_and(cv2.compare(response, highest, cv2.CMP_EQ), strong)
-    if reachable is not None:
-        mask = cv2.bitwise_and(mask, reachable)
     found = cv2.findNonZero(mask)
     if found is None:
         return np.empty((0, 2), np.int64)
-    uv = found.reshape(-1, 2).astype(np.int64)
-    order = np.argsort(-response[uv[:, 1], uv[:, 0]].astype(np.int64), kind="stable")
-    return uv[order[:MOST]]
+    small = found.reshape(-1, 2).astype(np.int64)
+    uv = 2 * small
+    level = response[small[:, 1], small[:, 0]].astype(np.int64)
+    if reachable is not None:
+        can = reachable[np.minimum(uv[:, 1], reachable.shape[0] - 1), np.minimum(uv[:, 0], reachable.shape[1] - 1)] > 0
+        uv, level = uv[can], level[can]
+    return uv[np.argsort(-level, kind="stable")[:MOST]]
 
 
 def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -> Spots:
@@ -110,19 +123,19 @@ def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -
     v = np.clip(peaks[:, 1, None, None] + dv, 0, height - 1)
     u = np.clip(peaks[:, 0, None, None] + du, 0, width - 1)
     patch = on[v, u].astype(np.float32) - off[v, u].astype(np.float32)
-    ring = np.hypot(dv, du) > REACH - 0.8
+    ring = np.hypot(dv, du) > REACH - 0.3
     around = patch[:, ring]
     base = np.median(around, axis=1)
     noise = 1.4826 * np.median(np.abs(around - base[:, None]), axis=1) + 0.25
     patch -= base[:, None, None]
     centre = np.zeros((len(peaks), 2), np.float32)
-    for width_px in (2.4, 2.0, 2.0):
+    for width_px in (2.6, 2.2, 2.0):
         distance2 = (x0 - centre[:, 0, None, None]) ** 2 + (y0 - centre[:, 1, None, None]) ** 2
         weight = np.maximum(patch, 0) * np.exp(distance2 * np.float32(-0.5 / width_px**2))
         total = weight.sum(axis=(1, 2)) + 1e-6
         offset = np.stack([(weight * x0).sum(axis=(1, 2)), (weight * y0).sum(axis=(1, 2))], axis=1) / total[:, None]
         # a window on a spot of like width halves the offset: twice the step, kept within the patch
-        centre = np.clip(centre + 1.7 * (offset - centre), -2.5, 2.5)
+        centre = np.clip(centre + 1.7 * (offset - centre), -2.7, 2.7)
     spread2 = 0.5 * (weight * distance2).sum(axis=(1, 2)) / total
     spread2 = 1 / np.maximum(1 / np.maximum(spread2, 0.5) - 1 / width_px**2, 0.12)
     strong = slice(0, max(12, len(peaks) // 4))
@@ -147,7 +160,7 @@ def _fitted(
     """Centre (n, 2), height and standard deviation of the centre of round Gaussian spots of variance `width2` px², by
     Gauss and Newton from `centre`; pixels that are not `usable` (burnt out) do not count."""
     level = np.zeros(len(patch), np.float32)
-    for step in range(3):
+    for step in range(2):
         x, y = du - centre[:, 0, None, None], dv - centre[:, 1, None, None]
         distance2 = x * x + y * y
         shape = np.exp(distance2 * np.float32(-0.5 / width2))
@@ -164,7 +177,7 @@ def _fitted(
         centre = np.clip(centre + np.clip(change[:, 1:], -0.7, 0.7), -3.5, 3.5)
     inverse = np.linalg.inv(normal)
     spread = inverse @ (weighted @ weighted.transpose(0, 2, 1)) @ inverse
-    sigma = np.sqrt(0.5 * (spread[:, 1, 1] + spread[:, 2, 2])) * noise
+    sigma = 0.8 * np.sqrt(0.5 * (spread[:, 1, 1] + spread[:, 2, 2])) * noise  # the ring holds the tails of the spot, too
     return centre.astype(float), level.astype(float), np.hypot(sigma, 0.04).astype(float)
 
 
@@ -177,10 +190,9 @@ def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:
 
 def without_spots(on: Image, off: Image, spots: Spots, reach: int = 5) -> Image:
     """The laser-on image (h, w) or (h, w, c) with every spot painted over from the laser-off image, moved as `spots.motion` says."""
-    clean = on.copy()
-    still = shifted(off, spots.motion) if spots.motion.any() else off
-    still, clean = still.reshape(on.shape), clean
-    for u, v in np.rint(spots.uv).astype(int).tolist():
-        box = (slice(max(v - reach, 0), v + reach + 1), slice(max(u - reach, 0), u + reach + 1))
-        clean[box] = still[box]
-    return clean
+    mask = np.zeros(on.shape[:2], np.uint8)
+    at = np.rint(spots.uv).astype(int)
+    mask[at[:, 1].clip(0, len(mask) - 1), at[:, 0].clip(0, mask.shape[1] - 1)] = 255
+    mask = cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    still = shifted(off, spots.motion).reshape(on.shape) if spots.motion.any() else off
+    return np.asarray(cv2.copyTo(still, mask, on.copy()), np.uint8).reshape(on.shape)

@@ -27,6 +27,7 @@ MODEL_HUB_PX = 1.0  # what equal straight edges leave out: foreshortening, twist
 MODEL_DIRECTION = np.deg2rad(0.4)
 LEAST_SUPPORT = 0.5
 MOST_FITS = 3
+CLEAR_AGREEMENT = 0.95  # share of the six edges' length at which no wider search is needed
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,11 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -
         image = np.asarray(cv2.resize(image, (small.width, small.height), interpolation=cv2.INTER_AREA), np.uint8)
     picture = _picture(image, small)
     near, within = (expected.hub / factor, 4 * expected.sigma_px / factor) if expected is not None else (None, np.inf)
-    settled_on = [settled(picture, start_of(guess)) for guess in guesses(picture.planes, near, within)]
+    starts = [start_of(guess) for guess in guesses(picture.planes, near, within)]
+    settled_on = [settled(picture, start) for start in starts]
+    if max((agreed for _, agreed in settled_on), default=1.0) < CLEAR_AGREEMENT:
+        # One edge was taken for a line of the background, which a wider search among all six finds out.
+        settled_on += [settled(picture, start, rounds=6, tries=500, breadth=1.8) for start in starts[:2]]
     settled_on.sort(key=lambda found: -found[1])
     fits = [fit_rotor(picture, *found) for found in settled_on[:MOST_FITS]]
     elapsed = {"far_view": (time.perf_counter() - started) * 1e3}

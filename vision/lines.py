@@ -12,9 +12,9 @@ from vision.capture import Image
 
 Array = NDArray[np.float64]
 
-ANGLES = 90  # bins of 2° modulo 180°
-SPREAD = 2  # bins to each side that a pixel votes for: its gradient's direction is no better known
-MOST_PIXELS = 9000  # edge pixels that vote, the strongest
+ANGLES = 60  # bins of 3° modulo 180°
+SPREAD = 1  # bins to each side that a pixel votes for: its gradient's direction is no better known
+MOST_PIXELS = 6000  # edge pixels that vote, the strongest
 RHO_STEP = 2.0  # px of the half-size image
 REACH = 7  # px across a candidate line within which its step is looked for
 SAMPLES = 96  # profiles along a candidate line
@@ -233,9 +233,9 @@ def refine_lines(
     used = agrees * near
     scatter2 = (residual**2 * used).sum(axis=1) / np.maximum(used.sum(axis=1), 1) + 0.01
     # Neighbouring profiles share pixels: three of them count as one.
-    covariance = np.linalg.inv(information) * (3 * scatter2)[:, None, None]
+    covariance = np.linalg.inv(information) * (2 * scatter2)[:, None, None]
     slope_sigma = np.sqrt(covariance[:, 1, 1])
-    rho_sigma = np.sqrt(covariance[:, 0, 0] + 0.08**2)
+    rho_sigma = np.sqrt(covariance[:, 0, 0] + 0.04**2)
     bend_px = 2 * fit[:, 2]
     return Profiles(new_normal, new_rho, t, residual, step, agrees, slope_sigma, rho_sigma, bend_px, focus)
 

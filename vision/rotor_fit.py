@@ -122,16 +122,18 @@ def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
     )
 
 
-def settled(picture: Picture, start: Array, rounds: int = 4, tries: int = 240) -> tuple[Array, float]:
+def settled(
+    picture: Picture, start: Array, rounds: int = 4, tries: int = 240, breadth: float = 1.0
+) -> tuple[Array, float]:
     """The parameters (8,) near `start` whose six edges the picture agrees with most, and that agreement, 0 to 1.
 
     A cross-entropy search: any line of the background may be stronger than one edge of one blade, but nothing else
-    agrees with all six at once. The same picture gives the same answer.
+    agrees with all six at once. breadth: of the search, 1 for a good guess. The same picture gives the same answer.
     """
     rng = np.random.default_rng(0)
     width = start[5] + start[6]
     mean = start.copy()
-    spread = np.array([4, 4, 0.02, 0.15, 0.06, 0.08 * width + 1, 0.12 * width + 1, 0.2 * start[7]])
+    spread = breadth * np.array([4, 4, 0.02, 0.15, 0.06, 0.08 * width + 1, 0.12 * width + 1, 0.2 * start[7]])
     best, best_value = start, -np.inf
     for _ in range(rounds):
         drawn = mean + spread * rng.standard_normal((tries, 8))
