@@ -192,9 +192,7 @@ class StatesReader:
         elif "initial" in table.entries:
             self.report(table.key_location("initial"), "M214", "initial belongs to a state with states inside")
         if final is None and "with" in table.entries and "do" not in table.entries and "states" not in table.entries:
-            self.report(
-                table.key_location("with"), "M214", "with: are the parameters of a behaviour, and `do` is missing"
-            )
+            self.report(found.place, "M214", f"the state {found.path!r} has parameters, but no `do` that takes them")
 
     def do(self, table: Table) -> str | None:
         node = table.get("do")
