@@ -15,6 +15,7 @@ from vision.estimate import BladeFrame
 from vision.observation import BladeObservation, Edge
 
 Array = NDArray[np.float64]
+PATCH_M = 3.0  # distance for which the settings say how far a surface is from a plane
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,9 @@ def measure(
     by_plane = jacobian(lambda p: in_blade_frame(seen, p), plane)
     H = np.zeros((len(value), SIZE))
     H[:size, :size] = np.eye(size)
-    left_out = [settings.surface_sigma_m, settings.surface_slope_sigma, settings.surface_slope_sigma][:size]
+    # The dots cover more of a round surface from farther away, and a plane fits that the worse.
+    wide = max(observation.distance_m / PATCH_M, 1.0)
+    left_out = [settings.surface_sigma_m * wide**2, *[settings.surface_slope_sigma * wide] * 2][:size]
     parts = {"surface": slice(0, size)}
     for i, side in enumerate(sides):
         rows = slice(size + 2 * i, size + 2 * i + 2)

@@ -31,15 +31,15 @@ class TrackerSettings:
     """What the tracker assumes of blade, vehicle and observations. Lengths in metres, angles in radians, slopes in m/m.
 
     prior_*: how far the survey may be wrong where nothing has been seen. *_per_root_m: random walk of a slope per
-    square root of a metre travelled (taper, twist, bend). round_*: near the root the blade is as round as a barrel,
-    and its slope across turns within a hand's breadth; fully so inside the first station, no more beyond the second.
+    square root of a metre travelled (taper, twist, bend). round_*: near the root the blade is as round as a barrel, and
+    its slope across turns within a hand's breadth; fully so inside the first station, no more beyond the second.
     drift_*: random walk of the vehicle's local position. attitude_sigma: of the camera's angles. surface_*, edge_*:
-    what plane and straight line leave out, added to what an observation claims. gate: share of good measurements that
-    each χ² gate lets pass. confirmations: agreeing observations before anything is estimated. After `patience`
+    what plane and straight line leave out at 3 m, added to what an observation claims. gate: share of good measurements
+    that each χ² gate lets pass. confirmations: agreeing observations before anything is estimated. After `patience`
     rejections in a row the covariance is inflated at each one by inflation_m and inflation_slope, up to
     inflation_limit_m; after `restart_after` in a row that agree among themselves, within the prior and no deeper than
-    restart_deeper_m behind the tracked surface, the tracker starts again from them. history_s: how late an
-    observation may be.
+    restart_deeper_m behind the tracked surface, the tracker starts again from them. history_s: how late an observation
+    may be.
     """
 
     prior_depth_m: float = 3.0
@@ -54,7 +54,7 @@ class TrackerSettings:
     leading_slope_per_root_m: float = 0.04
     trailing_slope_per_root_m: float = 0.08
     drift_m_per_root_s: float = 0.02
-    attitude_sigma: float = 0.002
+    attitude_sigma: float = 0.003
     surface_sigma_m: float = 0.005
     surface_slope_sigma: float = 0.01
     edge_sigma_m: float = 0.008

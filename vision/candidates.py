@@ -28,13 +28,14 @@ class Blade:
     """The dots of the blade (n, 2), and where dots would be if it went on but are none, (m, 2); image frame, working px.
 
     texture: how strong steps on the blade itself are, between neighbouring dots, in grey levels.
-    strays: share of the dots that may lie beyond an edge all the same.
+    strays: share of the dots that may lie beyond an edge all the same. grid_known: `absent` rests on the laser's own grid.
     """
 
     dots: Array
     absent: Array
     texture: float
     strays: float = 0.03
+    grid_known: bool = True
 
 
 @dataclass(frozen=True)

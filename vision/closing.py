@@ -29,7 +29,7 @@ def close(
         if (np.abs(apex) > half - 4).any():
             return edges, None
         return edges, Outline(toward, apex, toward, float(toward @ apex), SPIKE_SIGMA_PX)
-    outline = find_tip(smooth, sensor_noise(clean), edges, found.axis, blade.dots, blade.texture)
+    outline = find_tip(smooth, sensor_noise(clean), edges, found.axis, blade)
     if outline is None:
         return edges, None
     toward = outline.toward

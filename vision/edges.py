@@ -56,7 +56,8 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
         return Found(behind, float(np.arctan2(spike.toward[1], spike.toward[0]) % np.pi), spike, reasons)
     if not chosen:
         best = max((c.support for c in candidates), default=0.0)
-        return Found((), float("nan"), None, (f"no edge: the best line beside the dots has {best:.0%} support",))
+        axis = float("nan") if expected is None else expected % np.pi
+        return Found((), axis, None, (f"no edge: the best line beside the dots has {best:.0%} support",))
     directions = np.array([np.arctan2(c.outward[1], c.outward[0]) + np.pi / 2 for c in chosen])
     axis = 0.5 * np.angle(np.exp(2j * directions).sum()) % np.pi
     return Found(chosen, float(axis), None, ())

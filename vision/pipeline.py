@@ -26,7 +26,7 @@ from vision.closing import close
 
 Array = NDArray[np.float64]
 
-LEAST_DOTS = 5
+LEAST_DOTS = 4
 SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade
 
 
@@ -90,7 +90,7 @@ class Eye:
             )
         surface = fit_surface(rays[blade.left], blade.inverse_depth, blade.sigma)
         if surface is None:
-            return self._refused(frames, watch, f"{len(blade)} dots, all on one line: no surface")
+            return self._refused(frames, watch, f"{len(blade)} dots that make no surface before the camera")
         blade = blade.take(surface.inliers)
         watch.lap("surface")
         return self._outlined(frames, images, left, right, rays, matches, blade, surface, watch, expected)

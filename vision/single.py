@@ -53,7 +53,7 @@ def observe_photograph(image: Image, stamp_s: float = 0.0) -> BladeObservation:
     clean = _painted(tones(small), background, uv)
     smooth = smoothed(clean)
     inside = (lattice.absent > 4).all(axis=1) & (lattice.absent < 2 * centre - 4).all(axis=1)
-    blade = Blade(seeds - centre, lattice.absent[inside] - centre, texture_between(smooth, seeds), 0.1)
+    blade = Blade(seeds - centre, lattice.absent[inside] - centre, texture_between(smooth, seeds), 0.1, False)
     found = find_edges(clean, blade, None)
     watch.lap("edges")
     edges, outline = close(found, clean, smooth, blade)

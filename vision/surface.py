@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SLOPE, BEND = 0.35, 3.0  # of a blade's surface: relative change of inverse depth per image unit at focal length one
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -38,6 +40,14 @@ class Surface:
         return result
 
 
+def _held(design: Array, inverse_depth: Array) -> Array:
+    """The little information (k, k) that a surface's slope is within SLOPE and its bend within BEND of none."""
+    near = float(np.median(np.abs(inverse_depth)))
+    spread = np.array([1e3, SLOPE, SLOPE, BEND, BEND, BEND])[: design.shape[1]] * near
+    result: Array = np.diag(1 / spread**2)
+    return result
+
+
 def _terms(rays: Array, count: int) -> Array:
     y, z = rays[:, 1], rays[:, 2]
     return np.stack([np.ones_like(y), y, z, y * y, y * z, z * z][:count], axis=1)
@@ -46,32 +56,35 @@ def _terms(rays: Array, count: int) -> Array:
 def fit_surface(rays: Array, inverse_depth: Array, sigma: Array) -> Surface | None:
     """The surface through points at inverse depths (n,) along rays (n, 3), sigmas (n,) of the inverse depths.
 
-    Robust against some wrong points. None with fewer than four points or with all of them on one line, where the slope
-    across it is free.
+    Robust against some wrong points. Where all lie on one line, the slope across it is what a blade's surface usually has
+    (SLOPE), with that uncertainty. None with fewer than four points.
     """
     if len(rays) < 4:
-        return None
-    spread = np.linalg.eigvalsh(np.cov(rays[:, 1:].T))
-    if spread[0] < (4.0 / 616) ** 2:
         return None
     # A point may stand off its neighbours by a little relief of the surface, which no sensor noise explains.
     relief = np.hypot(sigma, 0.002 * inverse_depth)
     start = _consensus(rays, inverse_depth, relief)
     flat, flat_weight, flat_cost = _robust(_terms(rays, 3), inverse_depth, relief, start)
     coefficients, weight, count, bent = np.r_[flat, 0, 0, 0], flat_weight, 3, False
+    unmodelled = 0.0
     if len(rays) >= 16:
         curved, curved_weight, curved_cost = _robust(_terms(rays, 6), inverse_depth, relief, np.r_[start, 0, 0, 0])
         free = len(rays) - 6
         reach = np.hypot(rays[:, 1], rays[:, 2]).min()
-        if (flat_cost - curved_cost) / 3 > 6 * max(curved_cost / free, 1.0) and reach < 0.08:
+        better = (flat_cost - curved_cost) / 3 / max(curved_cost / free, 1.0)
+        # A bend that is there and not modelled shows in the depth where the optical axis meets the surface.
+        unmodelled = abs(flat[0] - curved[0]) * float(np.clip((better - 1) / 5, 0, 1))
+        if better > 6 and reach < 0.08:
+            unmodelled = 0.0
             coefficients, weight, count, bent = curved, curved_weight, 6, True
     design = _terms(rays, count)
-    information = (design * weight[:, None]).T @ design
+    information = (design * weight[:, None]).T @ design + _held(design, inverse_depth)
     covariance = np.linalg.inv(information)[:3, :3]
     residual = (inverse_depth - design @ coefficients[:count]) / relief
     inliers = np.abs(residual) < 5
     freedom = max(int(inliers.sum()) - count, 1)
     covariance *= max(1.0, float((residual[inliers] ** 2).sum()) / freedom)
+    covariance[0, 0] += unmodelled**2
     a, b, c = coefficients[:3]
     if a <= 0:
         return None
@@ -113,7 +126,7 @@ def _robust(design: Array, values: Array, sigma: Array, start: Array) -> tuple[A
         loose = 4.0 if step == 0 else 1.5
         weight = 1 / sigma**2 / (1 + (residual / (2.5 * loose)) ** 2) ** 2
         weighted = design * weight[:, None]
-        solution = np.linalg.solve(weighted.T @ design + 1e-12 * np.eye(design.shape[1]), weighted.T @ values)
+        solution = np.linalg.solve(weighted.T @ design + _held(design, values), weighted.T @ values)
     residual = (values - design @ solution) / sigma
     cost = float((np.minimum(np.abs(residual), 5) ** 2).sum())
     return solution, weight, cost

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.candidates import Candidate
+from vision.candidates import Blade, Candidate
 from vision.lines import sampled, visible_stretch
 from vision.observation import Line, Tip
 
@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 LANES = 25  # across the blade, from edge to edge
 STEP = 1.5  # px along a lane
 LANE_DOTS = 12.0  # px to each side of a lane within which dots show that the blade goes on
+BEYOND_MISSING = 8.0  # px: a rounded tip may reach a little past the first missing dot beside it
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 BOX, LONG_BOX = 5, 18  # samples averaged on either side of a step, and on either side to tell it from a streak
 
@@ -35,17 +36,29 @@ class Outline:
     step: float = 0.0
 
 
-def find_tip(
-    smooth: Image, noise: float, edges: tuple[Candidate, ...], axis: float, dots: Array, texture: float
-) -> Outline | None:
-    """The tip, or None where the blade leaves the image. dots (n, 2): dots on the blade, image frame, working px."""
-    if not edges:
+def find_tip(smooth: Image, noise: float, edges: tuple[Candidate, ...], axis: float, blade: Blade) -> Outline | None:
+    """The tip, or None where the blade leaves the image. axis: direction of the blade in the image, NaN where unknown."""
+    if np.isnan(axis):
         return None
     ends = [
-        _closed_end(smooth, noise, edges, sign * np.array([np.cos(axis), np.sin(axis)]), dots, texture)
-        for sign in (1.0, -1.0)
+        _closed_end(smooth, noise, edges, sign * np.array([np.cos(axis), np.sin(axis)]), blade) for sign in (1.0, -1.0)
     ]
     return max((end for end in ends if end is not None), key=lambda end: end.step, default=None)
+
+
+def _last_and_missing(blade: Blade, toward: Array, low: float, high: float) -> tuple[float, float] | None:
+    """(last dot, first missing dot) along the axis in the middle of the strip, None unless dots are missing there, at least
+    two of them, and none is seen beyond: then the blade ends in between."""
+    if not blade.grid_known or len(blade.absent) == 0:
+        return None
+    across = np.array([-toward[1], toward[0]])
+    middle, reach = (low + high) / 2, 0.36 * (high - low)
+    seen = blade.dots[np.abs(blade.dots @ across - middle) < 0.5 * (high - low) + 6] @ toward
+    gone = np.sort(blade.absent[np.abs(blade.absent @ across - middle) < max(reach, 10.0)] @ toward)
+    gone = gone[gone > seen.max() + 3.0] if len(seen) else gone[:0]
+    if len(gone) < 2:
+        return None
+    return float(seen.max()), float(gone[0])
 
 
 def _end_of(edge: Candidate, toward: Array) -> tuple[float, float]:
@@ -61,39 +74,59 @@ def _end_of(edge: Candidate, toward: Array) -> tuple[float, float]:
 
 
 def _closed_end(
-    smooth: Image, noise: float, edges: tuple[Candidate, ...], toward: Array, dots: Array, texture: float
+    smooth: Image, noise: float, edges: tuple[Candidate, ...], toward: Array, blade: Blade
 ) -> Outline | None:
     height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     across = np.array([-toward[1], toward[0]])
+    dots = blade.dots
     last_dot = float(np.max(dots @ toward))
     ends = [_end_of(edge, toward) for edge in edges]
-    if any(leave - last < BORDER for last, leave in ends):
-        return None
-    end = min(last for last, _ in ends)
-    low, high = _strip(edges, toward, across, dots, end)
+    end = min((last for last, _ in ends), default=last_dot)
+    low, high = _strip(edges, toward, across, dots, min(end, last_dot + 30.0))
     wide = high - low
     if wide < 16:
+        return None
+    bracket = _last_and_missing(blade, toward, low, high)
+    if bracket is None and (not ends or any(leave - last < BORDER for last, leave in ends)):
         return None
     start, stop = visible_stretch(across[None], np.array([(low + high) / 2]), centre - 3)
     sign = 1.0 if np.array([-across[1], across[0]]) @ toward > 0 else -1.0
     border = float((stop if sign > 0 else -start)[0])
     first = min(end - 0.5 * wide, last_dot) - 3 * BOX
     far = min(border, max(end, last_dot) + 1.6 * wide + 60)
-    if far - first < 6 * BOX:
-        return None
-    lanes = low + wide * np.linspace(0.06, 0.94, LANES)
-    s = np.arange(first, far, STEP)
-    u = s * toward[0] + lanes[:, None] * across[0] + centre[0]
-    v = s * toward[1] + lanes[:, None] * across[1] + centre[1]
-    strip = sampled(smooth, u, v)
-    outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
-    least = max(4.0, 2.0 * noise, 0.3 * float(np.mean([edge.step for edge in edges])), 1.2 * texture)
-    where, found, size = _lane_ends(strip, outside, s, least, _quiet_until(lanes, dots, toward, across, first))
-    if found.mean() < 0.6:
-        return None
-    outline = _outline(lanes, where, found, toward, across, last_dot, border, wide)
-    return None if outline is None else replace(outline, step=float(np.median(size[found])))
+    least = max(4.0, 2.0 * noise, 0.3 * float(np.mean([edge.step for edge in edges] or [0.0])), 1.2 * blade.texture)
+    clear = least
+    if bracket is not None:
+        far = min(border, bracket[1] + max(BEYOND_MISSING, 0.4 * wide) + BOX * STEP)
+        least = max(3.0, 1.5 * noise, 0.15 * least)
+    outline = None
+    if far - first >= 6 * BOX:
+        lanes = low + wide * np.linspace(0.06, 0.94, LANES)
+        s = np.arange(first, far, STEP)
+        u = s * toward[0] + lanes[:, None] * across[0] + centre[0]
+        v = s * toward[1] + lanes[:, None] * across[1] + centre[1]
+        outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
+        quiet = _quiet_until(lanes, dots, toward, across, first)
+        where, found, size = _lane_ends(sampled(smooth, u, v), outside, s, least, quiet)
+        if found.mean() >= 0.6:
+            outline = _outline(lanes, where, found, toward, across, last_dot, border, wide)
+        if outline is not None:
+            outline = replace(outline, step=float(np.median(size[found])))
+    if bracket is None:
+        return outline
+    reach = float(outline.point @ toward) if outline is not None else np.inf
+    within = bracket[1] + (BEYOND_MISSING if outline is None or outline.step < clear else max(BEYOND_MISSING, 0.4 * wide))
+    if outline is not None and bracket[0] - 4 < reach < within:
+        return replace(outline, step=outline.step + 1.0)
+    return _between(bracket, (low + high) / 2, toward, across)
+
+
+def _between(bracket: tuple[float, float], lane: float, toward: Array, across: Array) -> Outline:
+    """A tip whose outline cannot be seen: somewhere between the last dot and the first one missing."""
+    station = sum(bracket) / 2
+    spread = (bracket[1] - bracket[0]) / np.sqrt(12) + 2.0
+    return Outline(toward, station * toward + lane * across, toward, station, float(spread))
 
 
 def _quiet_until(lanes: Array, dots: Array, toward: Array, across: Array, first: float) -> Array:
