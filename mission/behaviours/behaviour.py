@@ -35,7 +35,8 @@ class Behaviour:
 
     outcomes: name → what it means, the only values `run` may return. airborne: it expects to be flying while it runs,
     or None where it does not care. needs_vision: it cannot work without images. keeps_standoff: it keeps its parameter
-    `standoff_m` all the time, so that the monitor may hold it to that.
+    `standoff_m` all the time, so that the monitor may hold it to that. laser: it lights the laser; those that need
+    images do unless they say otherwise.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Behaviour:
     needs_vision: bool
     text: str
     keeps_standoff: bool = False
+    laser: bool = False
 
 
 _REGISTRY: dict[str, Behaviour] = {}
@@ -58,6 +60,7 @@ def behaviour(
     airborne: bool | None = True,
     needs_vision: bool = False,
     keeps_standoff: bool = False,
+    laser: bool | None = None,
 ) -> Callable[[Callable[[Services, P], Awaitable[str]]], Callable[[Services, P], Awaitable[str]]]:
     """Register a coroutine as the behaviour of its own name; users read its docstring in `mission list behaviours`."""
 
@@ -66,7 +69,10 @@ def behaviour(
         if name in _REGISTRY and _REGISTRY[name].run.__module__ != run.__module__:
             raise ValueError(f"behaviour {name!r} is declared in {_REGISTRY[name].run.__module__} and {run.__module__}")
         text = (run.__doc__ or "").strip()
-        _REGISTRY[name] = Behaviour(name, run, parameters, dict(outcomes), airborne, needs_vision, text, keeps_standoff)
+        lit = needs_vision if laser is None else laser
+        _REGISTRY[name] = Behaviour(
+            name, run, parameters, dict(outcomes), airborne, needs_vision, text, keeps_standoff, lit
+        )
         return run
 
     return register

@@ -25,6 +25,7 @@ class ReacquireBlade(Parameters):
 @behaviour(
     outcomes={"reacquired": "the blade is tracked again", "not_found": "it did not come back"},
     parameters=ReacquireBlade,
+    laser=True,
 )
 async def reacquire_blade(services: Services, parameters: ReacquireBlade) -> str:
     """Stop, back off a little along the line of sight, and wait until the blade has been tracked again for a while."""

@@ -32,6 +32,7 @@ class SurveyTurbine(Parameters):
     },
     parameters=SurveyTurbine,
     needs_vision=True,
+    laser=False,
 )
 async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
     """Picture the rotor from several places in front of it, intersect the views, and correct what the survey said."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from mission.language.loading import Examination
 
 
 def validate(
@@ -24,8 +27,9 @@ def validate(
 ) -> None:
     """Check missions: names, types, limits, references; and whether the machine always ends, and ends safely.
 
-    Every finding is one line, file:line:column: CODE message. docs/codes explains each code. A code that may be silenced
-    is, by a comment on the same line that says why:  land: {…}  # allow: M305, it is asked to land until it has
+    Every finding is one line, file:line:column: CODE message. docs/codes explains each code. A code that may be
+    silenced is, by a comment on its line that says why:  land: {…}  # allow: M305, it is asked to land until it has
+    Scenario files are checked as well.
 
     \b
     Examples:
@@ -35,9 +39,8 @@ def validate(
     """
     from mission.language.codes import Level
     from mission.language.diagnostics import json_report
-    from mission.language.loading import examine
 
-    examinations = [(file, examine(file, changes or (), rig)) for file in files]
+    examinations = [(file, _examined(file, changes or [], rig)) for file in files]
     findings = [finding for _, examination in examinations for finding in examination.diagnostics]
     if as_json:
         print(json_report(findings))
@@ -54,3 +57,15 @@ def validate(
             print(f"{file}: ok, {len(mission.states)} states, {len(mission.transitions())} transitions")
     if any(finding.level is Level.ERROR or strict for finding in findings):
         raise typer.Exit(2)
+
+
+def _examined(file: Path, changes: list[str], rig: str | None) -> Examination:
+    """A mission, or a file of scenarios by its name."""
+    from mission.language.loading import Examination, examine
+
+    if not file.name.endswith(".scenario.yaml"):
+        return examine(file, changes, rig)
+    from mission.language.scenario_in import read
+
+    scenarios, findings = read(file)
+    return Examination(scenarios.mission if scenarios is not None else None, findings)

@@ -68,16 +68,10 @@ def flags(exploration: Exploration, situation: Situation) -> dict[str, float | b
     found: dict[str, float | bool | None] = {
         "airborne": flying,
         "armed": flying,
-        "laser_on": behaviour is not None and lights_laser(behaviour.name, behaviour.needs_vision),
+        "laser_on": behaviour is not None and behaviour.laser,
         "recording": bool(getattr(state.parameters, "record", False)),
         "needs_vision": behaviour is not None and behaviour.needs_vision,
         "ended": state.final is not None,
     }
     active = set(enclosing(situation.leaf))
     return found | {f"in({path})": path in active for path in exploration.mission.states}
-
-
-def lights_laser(name: str, needs_vision: bool) -> bool:
-    """Whether a behaviour runs the close-up cycle with the laser: those that need images, but for the survey, which
-    looks from afar; and the one that waits for the blade to come back."""
-    return (needs_vision and name != "survey_turbine") or name == "reacquire_blade"

@@ -50,6 +50,14 @@ def test_findings_are_printed_as_compilers_do_as_json_and_as_annotations(
     assert code == 2 and out.splitlines()[0].startswith(f"::error file={path},line={line},col=")
 
 
+def test_scenario_files_can_be_validated_like_missions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert output(capsys, "validate", str(MISSIONS / "scenarios" / "square.scenario.yaml"))[0] == 0
+    path = written(tmp_path, "mission: small.yaml\nscenarios: {a: [{stat: home}]}\n", "small.scenario.yaml")
+    written(tmp_path, SMALL)
+    code, out = output(capsys, "validate", str(path))
+    assert code == 2 and ":2:18: M501" in out and "did you mean state?" in out
+
+
 def test_warnings_do_not_stop_a_flight_unless_asked_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(written(tmp_path, SMALL.replace("initial: pre", "parameters: {unused_m: 1}\ninitial: pre")))
     assert output(capsys, "validate", path)[0] == 0
