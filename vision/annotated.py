@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 from vision.capture import Image
 from vision.observation import BladeObservation
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 DOT, EDGE, TIP, TEXT = (0, 220, 255), (40, 40, 235), (230, 60, 230), (255, 255, 255)  # BGR
 SMALLEST = 600  # px of width; a smaller image is enlarged so that the drawing can be read

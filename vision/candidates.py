@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from vision.capture import Image
 from vision.lines import Profiles, refine_lines, sampled, steps
 from vision.surface import Surface
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 CANDIDATES = 24
 LEAST_SUPPORT = 0.5
@@ -25,10 +26,12 @@ PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
 
 @dataclass(frozen=True)
 class Blade:
-    """The dots of the blade (n, 2), and where dots would be if it went on but are none, (m, 2); image frame, working px.
+    """The dots of the blade (n, 2), and where dots would be if it went on but are none, (m, 2); image frame, working
+    px.
 
     texture: how strong steps on the blade itself are, between neighbouring dots, in grey levels.
-    strays: share of the dots that may lie beyond an edge all the same. grid_known: `absent` rests on the laser's own grid.
+    strays: share of the dots that may lie beyond an edge all the same. grid_known: `absent` rests on the laser's own
+    grid.
     """
 
     dots: Array
@@ -51,9 +54,10 @@ class OtherEye:
 class Candidate:
     """A refined line with its outward normal and offset (image frame, working px) and what speaks for it.
 
-    support: share of the stretch beside the dots on which there is a step. parallax: share of that which the other eye sees
-    at the blade's depth. step: its height in grey levels. blocked: share of that stretch on which a step as strong lies between
-    dots and line. empty: share of the dots expected up to the line that are missing. beyond: missing ones past the line.
+    support: share of the stretch beside the dots on which there is a step. parallax: share of that which the other
+    eye sees at the blade's depth. step: its height in grey levels. blocked: share of that stretch on which a step as
+    strong lies between dots and line. empty: share of the dots expected up to the line that are missing. beyond:
+    missing ones past the line.
     ends: places between which the step goes on, along the direction `profile.direction[index]`.
     """
 
@@ -72,7 +76,8 @@ class Candidate:
 
 
 def texture_between(smooth: Image, dots: Array) -> float:
-    """How strong the steps between neighbouring dots are: what the blade's own dirt and shade do. dots (n, 2) in pixels."""
+    """How strong the steps between neighbouring dots are: what the blade's own dirt and shade do. dots (n, 2) in
+    pixels."""
     if len(dots) < 3:
         return 0.0
     apart = np.hypot(*(dots[:, None] - dots[None]).transpose(2, 0, 1))
@@ -134,7 +139,7 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
             2.0 * support[k]
             + 0.35 * float(np.clip(np.log2(step[k] / strongest), -3.0, 0.5))
             + 0.35 * float(np.clip(np.log2(step[k] / max(blade.texture, 1.0)), -2.0, 1.0))
-            + (0.2 if np.isnan(told) else 0.6 * told if told > 0.5 else -5.0 * (0.5 - told))
+            + (0.2 if np.isnan(told) else 0.6 * told if told > 0.5 else -7.0 * (0.5 - told))
             - 2.0 * blocked[k]
             - 2.5 * empty
             - 5.0 * crossed[k]
@@ -191,11 +196,11 @@ def run_of(profile: Profiles, k: int) -> tuple[float, float]:
         at = int(near[np.argmin(np.abs(near - at))])
     length = t[1] - t[0]
     first, last = at, at
-    for k in np.flatnonzero(share[at:]) + at:
+    for k in (np.flatnonzero(share[at:]) + at).tolist():
         if (k - last) * length > LONGEST_GAP:
             break
         last = int(k)
-    for k in np.flatnonzero(share[: at + 1])[::-1]:
+    for k in np.flatnonzero(share[: at + 1])[::-1].tolist():
         if (first - k) * length > LONGEST_GAP:
             break
         first = int(k)
@@ -203,7 +208,8 @@ def run_of(profile: Profiles, k: int) -> tuple[float, float]:
 
 
 def _missing(blade: Blade, normal: Array, rho: float, low: float, high: float) -> tuple[float, int]:
-    """Share of missing dots among those expected inside the line, beside the seen ones, and how many are missing beyond."""
+    """Share of missing dots among those expected inside the line, beside the seen ones, and how many are missing
+    beyond."""
     direction = np.array([-normal[1], normal[0]])
     if len(blade.absent) == 0:
         return 0.0, 0
@@ -218,8 +224,8 @@ def _missing(blade: Blade, normal: Array, rho: float, low: float, high: float) -
 def _blocked(
     profile: Profiles, blade: Blade, smooth: Image, step: Array, low: Array, high: Array, noise: float
 ) -> Array:
-    """Share (k,) of the stretch beside the dots on which a step as strong as the line's own, and stronger than the blade's
-    texture, lies between the outermost dots and the line."""
+    """Share (k,) of the stretch beside the dots on which a step as strong as the line's own, and stronger than the
+    blade's texture, lies between the outermost dots and the line."""
     height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     share = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES
@@ -263,8 +269,8 @@ def _parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noi
     across = np.minimum(behind, 0) + (np.abs(behind) + 2 * PARALLAX_PX) * (reach + 1) / 2 - PARALLAX_PX
     u = there[..., 0, None] + across * profile.normal[:, 0, None, None]
     v = there[..., 1, None] + across * profile.normal[:, 1, None, None]
-    gradient = steps(sampled(other.smooth, u, v))
-    gradient = (gradient + np.roll(gradient, 1, 1) + np.roll(gradient, -1, 1)) / 3
+    raw = steps(sampled(other.smooth, u, v))
+    gradient: Array = (raw + np.roll(raw, 1, 1) + np.roll(raw, -1, 1)) / 3
     middle = PARALLAX_SAMPLES // 2
     seen = (u[..., middle] > 4) & (v[..., middle] > 4)
     seen &= (u[..., middle] < width - 5) & (v[..., middle] < height - 5)

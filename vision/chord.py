@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,14 +11,14 @@ from vision.camera import Camera
 from vision.candidates import Candidate
 from vision.surface import Surface
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 
 def chord(
     edges: tuple[Candidate, ...], axis: float, camera: Camera, surface: Surface, near: Array
 ) -> tuple[float, float] | None:
-    """(chord, its standard deviation) in metres at the station of the blade nearest to `near` (2,), image frame; None unless
-    both edges are seen."""
+    """(chord, its standard deviation) in metres at the station of the blade nearest to `near` (2,), image frame; None
+    unless both edges are seen."""
     if len(edges) != 2:
         return None
     along = np.array([np.cos(axis), np.sin(axis)])
@@ -43,8 +45,8 @@ def heading(edges: tuple[Candidate, ...], axis: float, camera: Camera, surface: 
     """Direction of the blade's axis in the image, modulo π, perspective taken out: edges that are parallel on the blade
     converge in the image of a tilted one.
 
-    It is what the axis shows midway between two edges at the station nearest to `near` (2,), image frame, and with one edge
-    what it would show in the image centre.
+    It is what the axis shows midway between two edges at the station nearest to `near` (2,), image frame, and with
+    one edge what it would show in the image centre.
     """
     along = np.array([np.cos(axis), np.sin(axis)])
     across = np.array([-along[1], along[0]])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,17 +13,15 @@ from vision.edges import Found, refocused
 from vision.lines import sensor_noise
 from vision.tip import Outline, find_tip
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 BEHIND_TIP = 0.9  # of the blade's width: so far behind the tip a round one no longer bends the edges
 SPIKE_SIGMA_PX = 2.0
 
 
-def close(
-    found: Found, clean: Image, smooth: Image, blade: Blade
-) -> tuple[tuple[Candidate, ...], Outline | None]:
-    """The edges behind the tip and the tip, None where the blade leaves the image. clean, smooth (h, w, c): working image
-    free of dots, and its 3 × 3 mean."""
+def close(found: Found, clean: Image, smooth: Image, blade: Blade) -> tuple[tuple[Candidate, ...], Outline | None]:
+    """The edges behind the tip and the tip, None where the blade leaves the image. clean, smooth (h, w, c): working
+    image free of dots, and its 3 × 3 mean."""
     edges = found.edges
     if found.spike is not None:
         apex, toward = found.spike.apex, found.spike.toward

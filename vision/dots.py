@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 NEIGHBOURHOOD = 7  # px of the half-size image, what a dot is compared with; about half the spacing of the grid
 REACH = 4  # px, half the window of the centroid
@@ -95,7 +96,8 @@ def find_spots(off: Image, on: Image, reachable: Image | None = None) -> Spots:
 
 
 def _peaks(response: Image, threshold: float, reachable: Image | None) -> NDArray[np.int64]:
-    """Local maxima above a threshold in the half-size response: (n, 2) (u, v) of the whole image, the strongest first."""
+    """Local maxima above a threshold in the half-size response: (n, 2) (u, v) of the whole image, the strongest
+    first."""
     highest = cv2.dilate(response, np.ones((5, 5), np.uint8))
     _, strong = cv2.threshold(response, threshold, 255, cv2.THRESH_BINARY)
     mask = cv2.bitwise_and(cv2.compare(response, highest, cv2.CMP_EQ), strong)
@@ -108,7 +110,7 @@ def _peaks(response: Image, threshold: float, reachable: Image | None) -> NDArra
     if reachable is not None:
         can = reachable[np.minimum(uv[:, 1], reachable.shape[0] - 1), np.minimum(uv[:, 0], reachable.shape[1] - 1)] > 0
         uv, level = uv[can], level[can]
-    return uv[np.argsort(-level, kind="stable")[:MOST]]
+    return np.asarray(uv[np.argsort(-level, kind="stable")[:MOST]], np.int64)
 
 
 def _centroids(on: Image, off: Image, peaks: NDArray[np.int64], motion: Array) -> Spots:
@@ -177,7 +179,9 @@ def _fitted(
         centre = np.clip(centre + np.clip(change[:, 1:], -0.7, 0.7), -3.5, 3.5)
     inverse = np.linalg.inv(normal)
     spread = inverse @ (weighted @ weighted.transpose(0, 2, 1)) @ inverse
-    sigma = 0.8 * np.sqrt(0.5 * (spread[:, 1, 1] + spread[:, 2, 2])) * noise  # the ring holds the tails of the spot, too
+    sigma = (
+        0.8 * np.sqrt(0.5 * (spread[:, 1, 1] + spread[:, 2, 2])) * noise
+    )  # the ring holds the tails of the spot, too
     return centre.astype(float), level.astype(float), np.hypot(sigma, 0.04).astype(float)
 
 
@@ -185,14 +189,16 @@ def _first_of_each(uv: Array, apart_px: float) -> NDArray[np.bool_]:
     """Which points have no earlier point within a distance."""
     distance = np.hypot(*(uv[:, None] - uv[None]).transpose(2, 0, 1))
     near = np.triu(distance < apart_px, 1)
-    return ~near.any(axis=0)
+    return np.asarray(~near.any(axis=0))
 
 
 def without_spots(on: Image, off: Image, spots: Spots, reach: int = 5) -> Image:
-    """The laser-on image (h, w) or (h, w, c) with every spot painted over from the laser-off image, moved as `spots.motion` says."""
-    mask = np.zeros(on.shape[:2], np.uint8)
+    """The laser-on image (h, w) or (h, w, c) with every spot painted over from the laser-off image, moved as
+    `spots.motion` says."""
+    height, width = on.shape[:2]
+    mask = np.zeros((height, width), np.uint8)
     at = np.rint(spots.uv).astype(int)
-    mask[at[:, 1].clip(0, len(mask) - 1), at[:, 0].clip(0, mask.shape[1] - 1)] = 255
-    mask = cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    mask[at[:, 1].clip(0, height - 1), at[:, 0].clip(0, width - 1)] = 255
+    around = cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     still = shifted(off, spots.motion).reshape(on.shape) if spots.motion.any() else off
-    return np.asarray(cv2.copyTo(still, mask, on.copy()), np.uint8).reshape(on.shape)
+    return np.asarray(cv2.copyTo(still, around, on.copy()), np.uint8).reshape(on.shape)

@@ -1,4 +1,5 @@
-"""Finds the blade's edges: lines with every dot of the blade on one side, unbroken beside those dots, at the blade's depth.
+"""Finds the blade's edges: lines with every dot of the blade on one side, unbroken beside those dots, at the blade's
+depth.
 
 A line of the background (horizon, tower, another blade, a cable) ends where the blade hides it, lies behind a stronger
 step, has another parallax than the blade, or leaves room on the blade where dots ought to be; a seam or a streak on the
@@ -8,6 +9,7 @@ blade has dots on both sides or a weaker step than the edge. The edges of one bl
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from vision.lines import edge_pixels, hough_lines, refine_lines, sensor_noise, s
 from vision.observation import Edge, Line
 from vision.spike import Spike, edges_behind, find_spike
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 FROM_EXPECTED = np.deg2rad(28)  # half the taper, the root's flare, perspective, and what the expectation may be off
 LARGEST_TAPER = np.deg2rad(16)
@@ -30,7 +32,8 @@ SECOND_EDGE = 2.2  # how much less than the better edge the other one may be wor
 
 @dataclass(frozen=True)
 class Found:
-    """The blade's edges (none, one or two), the direction of its axis modulo π, NaN where nothing gives it, a spiked tip
+    """The blade's edges (none, one or two), the direction of its axis modulo π, NaN where nothing gives it, a spiked
+    tip
     if there is one, and reasons where there is no edge."""
 
     edges: tuple[Candidate, ...]

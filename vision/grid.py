@@ -1,13 +1,15 @@
 """Gives every spot its row and column in the laser's grid: left eye, right eye and laser ray must meet in one point.
 
-A pair of spots on one epipolar line gives a point; the laser sees that point at some (row, column), which must be a whole
-number. Pairs whose neighbours in the grid lie at a like depth form a surface. A wrong shift of the grid makes whole surfaces
-too, but seldom a whole number on both axes; where two contradicting surfaces stand up alike, the scene is refused.
+A pair of spots on one epipolar line gives a point; the laser sees that point at some (row, column), which must be a
+whole number. Pairs whose neighbours in the grid lie at a like depth form a surface. A wrong shift of the grid makes
+whole surfaces too, but seldom a whole number on both axes; where two contradicting surfaces stand up alike, the scene
+is refused.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from vision.camera import Camera, LaserGrid, StereoPair
 from vision.capture import Image
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 Indices = NDArray[np.int64]
 
 NEAREST_M, FARTHEST_M = 0.8, 25.0
@@ -61,10 +63,12 @@ class Matches:
 
 
 def inverse_depths(rays: Array, other_rays: Array, other_eye: Array) -> tuple[Array, Array, Array]:
-    """Where rays (n, 3) of the left lens, x = 1, meet rays (m, 3) from `other_eye` (3,), both in the left camera's axes.
+    """Where rays (n, 3) of the left lens, x = 1, meet rays (m, 3) from `other_eye` (3,), both in the left camera's
+    axes.
 
-    Returns (w, miss, lever), each (n, m): inverse depth in 1/m, distance of the two rays in the left image at focal length
-    one, and the change of image position by 1/m of inverse depth, in the same unit. Linear in w: no singularity at infinity.
+    Returns (w, miss, lever), each (n, m): inverse depth in 1/m, distance of the two rays in the left image at focal
+    length one, and the change of image position by 1/m of inverse depth, in the same unit. Linear in w: no
+    singularity at infinity.
     """
     other = other_rays[:, 1:] / other_rays[:, :1]
     lever = other_eye[1:] - other * other_eye[0]
@@ -86,7 +90,8 @@ def grid_coordinates(points: Array, laser: LaserGrid) -> Array:
 
 
 def expected_points(laser: LaserGrid, depth_m: float, slope: Array) -> Array:
-    """Points (rows * columns, 3) m where the laser's rays meet the plane depth = depth_m + slope · (y, z); NaN behind."""
+    """Points (rows * columns, 3) m where the laser's rays meet the plane depth = depth_m + slope · (y, z); NaN
+    behind."""
     directions = laser.directions().reshape(-1, 3)
     ahead = directions[:, 0] - directions[:, 1:] @ slope
     reach = (depth_m + laser.position[1:] @ slope - laser.position[0]) / ahead
@@ -119,8 +124,8 @@ def match_eyes(
     sigma_left: Array,
     sigma_right: Array,
 ) -> tuple[Matches, bool]:
-    """Matches of two eyes and whether they are ambiguous. Rays (n, 3) with x = 1, each in its own camera's axes; sigmas (n,)
-    are of their positions at focal length one."""
+    """Matches of two eyes and whether they are ambiguous. Rays (n, 3) with x = 1, each in its own camera's axes;
+    sigmas (n,) are of their positions at focal length one."""
     eye = -stereo.rotation.T @ stereo.translation
     w, miss, lever = inverse_depths(rays_left, rays_right @ stereo.rotation, eye)
     near = np.abs(miss) < EPIPOLAR_PX / stereo.left.fx

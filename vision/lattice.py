@@ -1,14 +1,16 @@
-"""Gives rows and columns to dots of one image alone, by walking the lattice they form; for photographs without a rig."""
+"""Gives rows and columns to dots of one image alone, by walking the lattice they form; for photographs without a
+rig."""
 
 from __future__ import annotations
 
 import heapq
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 Indices = NDArray[np.int64]
 
 LEAST_STEP, MOST_STEP = 24.0, 110.0  # px between neighbouring dots
@@ -18,7 +20,8 @@ OFF_STEP = 0.21  # of the spacing: how far from where its neighbours expect it a
 
 @dataclass(frozen=True)
 class Lattice:
-    """Which spots form it (n,), their rows and columns (n,) counted from zero, and where it would go on but does not (m, 2).
+    """Which spots form it (n,), their rows and columns (n,) counted from zero, and where it would go on but does not
+    (m, 2).
 
     spacing: px between neighbouring dots."""
 
@@ -32,8 +35,8 @@ class Lattice:
 def find_lattice(uv: Array, level: Array, shade: Array) -> Lattice | None:
     """The largest lattice among spots (n, 2); its rows run within 25° of the image's. None with fewer than four dots.
 
-    level (n,): heights of the spots. shade (n,): how bright it is around each; the lattice does not step where that changes
-    suddenly, for there the blade ends."""
+    level (n,): heights of the spots. shade (n,): how bright it is around each; the lattice does not step where that
+    changes suddenly, for there the blade ends."""
     steps = _steps(uv, level)
     if steps is None:
         return None
@@ -77,8 +80,8 @@ def _steps(uv: Array, level: Array) -> tuple[Array, Array] | None:
 
 
 def _walk(uv: Array, shade: Array, start: int, right: Array, down: Array) -> dict[int, tuple[int, int]]:
-    """Spots reached from one by steps right, left, down and up, with their places: the surest link first, so that a stray
-    spot finds its place taken. Steps adapt as they go, for the spacing changes over a slanting surface."""
+    """Spots reached from one by steps right, left, down and up, with their places: the surest link first, so that a
+    stray spot finds its place taken. Steps adapt as they go, for the spacing changes over a slanting surface."""
     place: dict[int, tuple[int, int]] = {}
     at: dict[tuple[int, int], int] = {}
     local: dict[int, tuple[Array, Array]] = {}
@@ -113,7 +116,8 @@ def _walk(uv: Array, shade: Array, start: int, right: Array, down: Array) -> dic
 
 
 def _held(uv: Array, place: dict[int, tuple[int, int]]) -> dict[int, tuple[int, int]]:
-    """Those with at least two neighbours, one of them in a line of three evenly spaced dots or at a corner of a square."""
+    """Those with at least two neighbours, one of them in a line of three evenly spaced dots or at a corner of a
+    square."""
     while True:
         at = {target: spot for spot, target in place.items()}
         kept = {}

@@ -1,8 +1,10 @@
-"""Straight steps of brightness: candidates by a gradient-directed Hough transform, refined on profiles across each line."""
+"""Straight steps of brightness: candidates by a gradient-directed Hough transform, refined on profiles across each
+line."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 ANGLES = 60  # bins of 3° modulo 180°
 SPREAD = 1  # bins to each side that a pixel votes for: its gradient's direction is no better known
@@ -23,10 +25,11 @@ SLOPE_HELD, BEND_HELD = 0.05, 1e-4  # what a fit of few steps is held to: slope,
 
 
 def sensor_noise(tones: Image) -> float:
-    """Standard deviation of the noise in grey levels, from what neighbours do not share in the quiet half of the image."""
+    """Standard deviation of the noise in grey levels, from what neighbours do not share in the quiet half of the
+    image."""
     part = tones[::2, :, 0]
     rough = part[:, 1:-1:5].astype(np.int16) * 2 - part[:, :-2:5] - part[:, 2::5]
-    return max(0.6, 1.4826 * float(np.median(np.abs(rough))) / np.sqrt(6.0))
+    return max(0.6, 1.4826 * float(np.median(np.abs(rough))) / float(np.sqrt(6.0)))
 
 
 @dataclass(frozen=True)
@@ -139,9 +142,9 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
 @dataclass(frozen=True)
 class Profiles:
     """K lines, each sampled at m places: refined normals (k, 2), rho (k,) signed along them (image frame, px), places
-    `t` (k, m) along the direction (normal turned by +90°), offset (k, m) px of the step from the refined line, signed step
-    (k, m) in grey levels along the normal, and `agrees` (k, m): the step is real and lies on the line. The line is the tangent
-    at `focus` (k,) of an edge whose slope changes by `bend` (k,) per px; offsets are from that curve."""
+    `t` (k, m) along the direction (normal turned by +90°), offset (k, m) px of the step from the refined line, signed
+    step (k, m) in grey levels along the normal, and `agrees` (k, m): the step is real and lies on the line. The line
+    is the tangent at `focus` (k,) of an edge whose slope changes by `bend` (k,) per px; offsets are from that curve."""
 
     normal: Array
     rho: Array
@@ -165,7 +168,8 @@ class Profiles:
 
 
 def visible_stretch(normal: Array, rho: Array, half: Array) -> tuple[Array, Array]:
-    """First and last place (k,) along each line inside the image of half extents `half` (2,); equal where it misses it."""
+    """First and last place (k,) along each line inside the image of half extents `half` (2,); equal where it misses
+    it."""
     direction = np.column_stack([-normal[:, 1], normal[:, 0]])
     foot = normal * rho[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -178,12 +182,19 @@ def visible_stretch(normal: Array, rho: Array, half: Array) -> tuple[Array, Arra
 
 
 def refine_lines(
-    smooth: Image, normal: Array, rho: Array, noise: float, focus: Array, reach: int = REACH, slopes_deg: float = 2.0, samples: int = SAMPLES
+    smooth: Image,
+    normal: Array,
+    rho: Array,
+    noise: float,
+    focus: Array,
+    reach: int = REACH,
+    slopes_deg: float = 2.0,
+    samples: int = SAMPLES,
 ) -> Profiles:
     """Lines fitted to the steepest steps across each of K candidate lines, robustly.
 
-    smooth: the tones (h, w, c) after a 3 × 3 mean. normal (k, 2), rho (k,) in the image frame. focus (k,): the place along each
-    line around which it is to be right, where the edge bends.
+    smooth: the tones (h, w, c) after a 3 × 3 mean. normal (k, 2), rho (k,) in the image frame. focus (k,): the place
+    along each line around which it is to be right, where the edge bends.
     """
     height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
@@ -198,12 +209,11 @@ def refine_lines(
     )
     u = base[0] + t[..., None] * direction[:, 0, None, None] + centre[0]
     v = base[1] + t[..., None] * direction[:, 1, None, None] + centre[1]
-    gradient = steps(sampled(smooth, u, v))
-    gradient = (gradient + 0.5 * (np.roll(gradient, 1, 1) + np.roll(gradient, -1, 1))) / 2
+    raw = steps(sampled(smooth, u, v))
+    gradient: Array = (raw + 0.5 * (np.roll(raw, 1, 1) + np.roll(raw, -1, 1))) / 2
     size = np.abs(gradient)
     best = np.argmax(size[..., 1:-1], axis=-1) + 1
-    take = lambda shift: np.take_along_axis(size, (best + shift)[..., None], -1)[..., 0]  # noqa: E731
-    before, peak, after = take(-1), take(0), take(1)
+    before, peak, after = (np.take_along_axis(size, (best + k)[..., None], -1)[..., 0] for k in (-1, 0, 1))
     bend = before - 2 * peak + after
     with np.errstate(divide="ignore", invalid="ignore"):
         fraction = np.where(bend < 0, 0.5 * (before - after) / bend, 0.0)
@@ -251,7 +261,7 @@ def _vote_slope(t: Array, offset: Array, real: NDArray[np.bool_], slopes_deg: fl
     near = real * np.exp(-0.5 * (t / 120) ** 2)
     for tried in slopes:
         place = np.clip(np.rint(offset - tried * t), -bins // 2 + 1, bins // 2 - 1).astype(np.int64) + bins // 2
-        counts = np.bincount((index * bins + place).ravel(), near.ravel(), lines * bins).reshape(lines, bins)
+        counts: Array = np.bincount((index * bins + place).ravel(), near.ravel(), lines * bins).reshape(lines, bins)
         counts[:, 1:-1] += 0.6 * (counts[:, :-2] + counts[:, 2:])
         counts[:, [0, 1, -2, -1]] = 0
         top = counts.argmax(axis=1)

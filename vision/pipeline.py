@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import RigGeometry
+from vision.candidates import Blade, Candidate, OtherEye, texture_between
 from vision.capture import Image, StereoFrames
 from vision.chord import chord, heading
+from vision.closing import close
 from vision.dots import Spots, find_spots, without_spots
-from vision.candidates import Blade, Candidate, OtherEye, texture_between
 from vision.edges import edge_of, find_edges
 from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser, reachable
 from vision.lines import smoothed
@@ -22,7 +23,6 @@ from vision.single import observe_photograph
 from vision.stopwatch import Stopwatch
 from vision.surface import Surface, fit_surface
 from vision.tip import tip_of
-from vision.closing import close
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,8 @@ SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as 
 class Eye:
     """Observes blades with one rig. Holds no state between frames and may be shared by threads.
 
-    Dots, points and edges all belong to the instant of the laser-on images; the laser-off images only tell the dots apart.
+    Dots, points and edges all belong to the instant of the laser-on images; the laser-off images only tell the dots
+    apart.
     """
 
     def __init__(self, geometry: RigGeometry) -> None:
@@ -113,7 +114,7 @@ class Eye:
         smooth = smoothed(clean)
         seeds = left.uv[blade.left]
         dots = seeds - camera.centre
-        around = Blade(dots, self._absent(left, right, blade, surface), texture_between(smooth, seeds))
+        around = Blade(dots, self._absent(left, right, matches, blade, surface), texture_between(smooth, seeds))
         other = None
         if right is not None:
             other = OtherEye(smoothed(tones(images["right_laser"])), self._stereo, surface)
@@ -125,7 +126,7 @@ class Eye:
         points = rays[blade.left] / blade.inverse_depth[:, None]
         width = chord(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
         direction = heading(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
-        if direction is None and found.spike is not None:
+        if direction is None and np.isfinite(axis):
             direction = axis
         sharp = sharpness(clean, edges)
         bright = exposure(images["left"], seeds)
@@ -186,8 +187,9 @@ class Eye:
                     uv, row, column = np.vstack([uv, left.uv[index]]), np.append(row, r), np.append(column, c)
         return Dots(to_full(uv, self.factor), row, column)
 
-    def _absent(self, left: Spots, right: Spots | None, blade: Matches, surface: Surface) -> Array:
-        """Where dots would lie in the left image (image frame, working px) if the blade went on, but are none."""
+    def _absent(self, left: Spots, right: Spots | None, matches: Matches, blade: Matches, surface: Surface) -> Array:
+        """Where dots would lie in the left image (image frame, working px) if the blade went on, but are none; a spot
+        that nothing explains there leaves it open."""
         laser, stereo = self.geometry.laser, self._stereo
         assert laser is not None
         points = expected_points(laser, surface.depth_m, surface.slope)
@@ -196,25 +198,26 @@ class Eye:
         points = points[free]
         inside = np.ones(len(points), bool)
         pixels = []
-        for camera, spots, there in (
-            (stereo.left, left, points),
-            (stereo.right, right, points @ stereo.rotation.T + stereo.translation),
+        for camera, spots, known, there in (
+            (stereo.left, left, matches.left, points),
+            (stereo.right, right, matches.right, points @ stereo.rotation.T + stereo.translation),
         ):
             uv = camera.project(there)
             pixels.append(uv)
             if spots is None:
                 continue
             inside &= (uv > 6).all(axis=1) & (uv < (camera.width - 7, camera.height - 7)).all(axis=1)
-            if len(spots):
-                apart = np.hypot(*(uv[:, None] - spots.uv[None]).transpose(2, 0, 1)).min(axis=1)
-                inside &= apart > 6
+            unread = np.delete(spots.uv, known, axis=0)
+            if len(unread):
+                inside &= np.hypot(*(uv[:, None] - unread).transpose(2, 0, 1)).min(axis=1) > 6
         return np.asarray(pixels[0][inside] - stereo.left.centre, float)
 
     def _check_size(self, name: str, image: Image) -> None:
         camera = self.geometry.stereo.right if name.startswith("right") else self.geometry.stereo.left
         if image.shape[:2] != (camera.height, camera.width):
             raise ValueError(
-                f"{name} image is {image.shape[1]} × {image.shape[0]} pixels, the rig's camera {camera.width} × {camera.height}"
+                f"{name} image is {image.shape[1]} × {image.shape[0]} pixels, "
+                f"the rig's camera {camera.width} × {camera.height}"
             )
 
     def _refused(self, frames: StereoFrames, watch: Stopwatch, *reasons: str) -> BladeObservation:
@@ -223,13 +226,14 @@ class Eye:
 
 
 def observe_single(image: Image, geometry: RigGeometry | None = None) -> BladeObservation:
-    """Dots, edges and tip of one laser-on photograph (h, w) or (h, w, 3), in its own pixels. There is no distance in it: the
-    rig's geometry is accepted so that a caller need not ask, and checked against the image's size."""
+    """Dots, edges and tip of one laser-on photograph (h, w) or (h, w, 3), in its own pixels. There is no distance in
+    it: the rig's geometry is accepted so that a caller need not ask, and checked against the image's size."""
     if geometry is not None:
         camera = geometry.stereo.left
         if image.shape[:2] != (camera.height, camera.width):
             raise ValueError(
-                f"image is {image.shape[1]} × {image.shape[0]} pixels, the rig's camera {camera.width} × {camera.height}"
+                f"image is {image.shape[1]} × {image.shape[0]} pixels, "
+                f"the rig's camera {camera.width} × {camera.height}"
             )
     return observe_photograph(image)
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.candidates import Candidate
 from vision.capture import Image
 from vision.lines import sampled
-from vision.candidates import Candidate
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 SHARPEST = 0.55  # of a step's height, gained within one pixel of a sharp image at working size
 

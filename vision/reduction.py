@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 WORKING_WIDTH = 620
 
 
@@ -37,8 +39,8 @@ def green(image: Image) -> Image:
 
 
 def tones(image: Image) -> Image:
-    """What outlines are sought in, (h, w, 1 or 2): blue and red, in which a grey blade differs from sky, field and soil alike
-    and the laser hardly shows; a grey image as it is."""
+    """What outlines are sought in, (h, w, 1 or 2): blue and red, in which a grey blade differs from sky, field and
+    soil alike and the laser hardly shows; a grey image as it is."""
     if image.ndim == 2:
         return image[:, :, None]
     both = np.empty((*image.shape[:2], 2), np.uint8)

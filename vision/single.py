@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.closing import close
 from vision.candidates import Blade, Candidate, texture_between
 from vision.capture import Image
+from vision.closing import close
 from vision.edges import edge_of, find_edges
-from vision.lattice import Lattice, find_lattice
+from vision.lattice import find_lattice
 from vision.lines import sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
@@ -18,7 +20,7 @@ from vision.reduction import green, reduce_image, reduction_factor, tones
 from vision.stopwatch import Stopwatch
 from vision.tip import tip_of
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 SMALL_WIDTH = 400  # px: a smaller photograph is enlarged, so that its dots have the size they have elsewhere
 LEAST_DOTS = 6
@@ -26,8 +28,8 @@ TALLEST, WIDEST = 26, 46  # px: the laser stands beside the camera, so its dots 
 
 
 def observe_photograph(image: Image, stamp_s: float = 0.0) -> BladeObservation:
-    """Dots, edges and tip of a laser-on photograph (h, w) or (h, w, 3); pixels of this image. `valid` means that edges were
-    found; distance, points and matches stay None."""
+    """Dots, edges and tip of a laser-on photograph (h, w) or (h, w, 3); pixels of this image. `valid` means that
+    edges were found; distance, points and matches stay None."""
     watch = Stopwatch()
     width = image.shape[1]
     factor = reduction_factor(width)
@@ -104,7 +106,8 @@ def bright_spots(grey: Image, most: int = 1000) -> tuple[Array, Array, Image]:
 
 
 def _centred(rise: Image, peaks: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Centroid (n, 2) and height (n,) of what stands above 0.4 of each peak, and whether it is a spot and no texture."""
+    """Centroid (n, 2) and height (n,) of what stands above 0.4 of each peak, and whether it is a spot and no
+    texture."""
     height, width = rise.shape
     dv, du = np.mgrid[-(TALLEST // 2) : TALLEST // 2 + 1, -(WIDEST // 2) : WIDEST // 2 + 1]
     at_u, at_v = peaks[:, 0, None, None] + du, peaks[:, 1, None, None] + dv

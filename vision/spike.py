@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.candidates import Candidate
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 NARROWEST, WIDEST = np.deg2rad(20), np.deg2rad(84)  # angle of the spike
 LEAST_VALUE = 2.0  # of each side as an edge
@@ -19,7 +20,8 @@ OFF_AXIS = np.deg2rad(14)  # from the spike's middle to an edge of the blade
 
 @dataclass(frozen=True)
 class Spike:
-    """Unit vector toward the apex (2,) along the blade's axis, the apex (2,), image frame, working px, and its two sides."""
+    """Unit vector toward the apex (2,) along the blade's axis, the apex (2,), image frame, working px, and its two
+    sides."""
 
     toward: Array
     apex: Array

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 SLOPE, BEND = 0.35, 3.0  # of a blade's surface: relative change of inverse depth per image unit at focal length one
 
@@ -16,9 +17,9 @@ SLOPE, BEND = 0.35, 3.0  # of a blade's surface: relative change of inverse dept
 class Surface:
     """A plane in the left camera's frame, depth = depth_m + slope · (y, z), with its covariance (3, 3) in that order.
 
-    inliers (n,): the points that agree. bent: a gently curved surface fits clearly better, and `depth_m` and the slopes are
-    its tangent where the optical axis meets it. coefficients (6,): inverse depth over (1, y, z, y², yz, z²) of the image at
-    focal length one; the last three are zero for a plane.
+    inliers (n,): the points that agree. bent: a gently curved surface fits clearly better, and `depth_m` and the
+    slopes are its tangent where the optical axis meets it. coefficients (6,): inverse depth over (1, y, z, y², yz,
+    z²) of the image at focal length one; the last three are zero for a plane.
     """
 
     depth_m: float
@@ -32,7 +33,7 @@ class Surface:
     def normal(self) -> Array:
         """Unit normal (3,) toward the camera."""
         normal = np.array([-1.0, *self.slope])
-        return normal / np.linalg.norm(normal)
+        return np.asarray(normal / np.linalg.norm(normal))
 
     def inverse_depth(self, rays: Array) -> Array:
         """Inverse depth (n,) along rays (n, 3) with x = 1."""
@@ -56,8 +57,8 @@ def _terms(rays: Array, count: int) -> Array:
 def fit_surface(rays: Array, inverse_depth: Array, sigma: Array) -> Surface | None:
     """The surface through points at inverse depths (n,) along rays (n, 3), sigmas (n,) of the inverse depths.
 
-    Robust against some wrong points. Where all lie on one line, the slope across it is what a blade's surface usually has
-    (SLOPE), with that uncertainty. None with fewer than four points.
+    Robust against some wrong points. Where all lie on one line, the slope across it is what a blade's surface usually
+    has (SLOPE), with that uncertainty. None with fewer than four points.
     """
     if len(rays) < 4:
         return None
@@ -93,8 +94,8 @@ def fit_surface(rays: Array, inverse_depth: Array, sigma: Array) -> Surface | No
 
 
 def _consensus(rays: Array, inverse_depth: Array, sigma: Array) -> Array:
-    """The plane (3,) through some dot and its neighbours on which most points lie; of two such planes that share few points,
-    the nearer one if it has at least a third as many."""
+    """The plane (3,) through some dot and its neighbours on which most points lie; of two such planes that share few
+    points, the nearer one if it has at least a third as many."""
     terms = _terms(rays, 3)
     apart = np.hypot(rays[:, None, 1] - rays[:, 1], rays[:, None, 2] - rays[:, 2])
     near = np.argsort(apart, axis=1, kind="stable")[:, : min(9, len(rays))]
@@ -112,9 +113,7 @@ def _consensus(rays: Array, inverse_depth: Array, sigma: Array) -> Array:
     chosen = int(rivals[np.argmax(count[rivals])]) if len(rivals) else best
     members = agrees[chosen]
     weighted = terms[members] / sigma[members, None] ** 2
-    return np.linalg.solve(
-        weighted.T @ terms[members] + 1e-9 * np.eye(3), weighted.T @ inverse_depth[members]
-    )
+    return np.linalg.solve(weighted.T @ terms[members] + 1e-9 * np.eye(3), weighted.T @ inverse_depth[members])
 
 
 def _robust(design: Array, values: Array, sigma: Array, start: Array) -> tuple[Array, Array, float]:

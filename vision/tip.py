@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.capture import Image
 from vision.candidates import Blade, Candidate
+from vision.capture import Image
 from vision.lines import sampled, visible_stretch
 from vision.observation import Line, Tip
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # of floats
 
 LANES = 25  # across the blade, from edge to edge
 STEP = 1.5  # px along a lane
@@ -25,8 +26,9 @@ BOX, LONG_BOX = 5, 18  # samples averaged on either side of a step, and on eithe
 
 @dataclass(frozen=True)
 class Outline:
-    """The end of the blade: unit vector toward it (2,), the outermost point (2,) on the axis, a line across (outward normal
-    (2,), rho), the standard deviation along the axis; image frame, working px. step: its height in grey levels."""
+    """The end of the blade: unit vector toward it (2,), the outermost point (2,) on the axis, a line across (outward
+    normal (2,), rho), the standard deviation along the axis; image frame, working px. step: its height in grey
+    levels."""
 
     toward: Array
     point: Array
@@ -37,7 +39,8 @@ class Outline:
 
 
 def find_tip(smooth: Image, noise: float, edges: tuple[Candidate, ...], axis: float, blade: Blade) -> Outline | None:
-    """The tip, or None where the blade leaves the image. axis: direction of the blade in the image, NaN where unknown."""
+    """The tip, or None where the blade leaves the image. axis: direction of the blade in the image, NaN where
+    unknown."""
     if np.isnan(axis):
         return None
     ends = [
@@ -47,8 +50,8 @@ def find_tip(smooth: Image, noise: float, edges: tuple[Candidate, ...], axis: fl
 
 
 def _last_and_missing(blade: Blade, toward: Array, low: float, high: float) -> tuple[float, float] | None:
-    """(last dot, first missing dot) along the axis in the middle of the strip, None unless dots are missing there, at least
-    two of them, and none is seen beyond: then the blade ends in between."""
+    """(last dot, first missing dot) along the axis in the middle of the strip, None unless dots are missing there, at
+    least two of them, and none is seen beyond: then the blade ends in between."""
     if not blade.grid_known or len(blade.absent) == 0:
         return None
     across = np.array([-toward[1], toward[0]])
@@ -116,7 +119,9 @@ def _closed_end(
     if bracket is None:
         return outline
     reach = float(outline.point @ toward) if outline is not None else np.inf
-    within = bracket[1] + (BEYOND_MISSING if outline is None or outline.step < clear else max(BEYOND_MISSING, 0.4 * wide))
+    within = bracket[1] + (
+        BEYOND_MISSING if outline is None or outline.step < clear else max(BEYOND_MISSING, 0.4 * wide)
+    )
     if outline is not None and bracket[0] - 4 < reach < within:
         return replace(outline, step=outline.step + 1.0)
     return _between(bracket, (low + high) / 2, toward, across)
@@ -133,7 +138,7 @@ def _quiet_until(lanes: Array, dots: Array, toward: Array, across: Array, first:
     """How far (lanes,) the blade's own dots reach in each lane: the outline is not before that."""
     beside = np.abs(dots @ across - lanes[:, None]) < LANE_DOTS
     reach = np.where(beside, dots @ toward, -np.inf).max(axis=1)
-    return np.maximum(reach + 4.0, first)
+    return np.asarray(np.maximum(reach + 4.0, first))
 
 
 def _strip(edges: tuple[Candidate, ...], toward: Array, across: Array, dots: Array, end: float) -> tuple[float, float]:
@@ -177,11 +182,13 @@ def _lane_ends(
 
 
 def _change(strip: Array, box: int) -> Array:
-    """Change (lanes, samples) of the mean over `box` samples before and after each place, of the tone that changes most."""
+    """Change (lanes, samples) of the mean over `box` samples before and after each place, of the tone that changes
+    most."""
     padded = np.pad(strip, ((0, 0), (box, box), (0, 0)), mode="edge")
     sums = np.cumsum(np.pad(padded, ((0, 0), (1, 0), (0, 0))), axis=1)
     mean = (sums[:, box:] - sums[:, :-box]) / box
-    return np.abs(mean[:, box : box + strip.shape[1]] - mean[:, : strip.shape[1]]).max(axis=2)
+    change: Array = np.abs(mean[:, box : box + strip.shape[1]] - mean[:, : strip.shape[1]]).max(axis=2)
+    return change
 
 
 def _outline(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from devices.scenes.settings import SceneSettings
 
-Array = NDArray[np.float32]
+Array = NDArray[Any]  # of floats
 
 
 def texture(rng: np.random.Generator, cells: int, octaves: int = 4) -> Array:
@@ -24,13 +26,15 @@ def texture(rng: np.random.Generator, cells: int, octaves: int = 4) -> Array:
 def sample(tile: Array, y: Array, z: Array) -> Array:
     """The tile at coordinates in units of the tile, about its middle."""
     size = np.float32(tile.shape[0] - 1)
-    return cv2.remap(tile, (y + 0.5) * size, (z + 0.5) * size, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT_101)
+    place = (y + 0.5) * size, (z + 0.5) * size
+    return np.asarray(cv2.remap(tile, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT_101))
 
 
 def coverage(value: Array) -> Array:
     """Share of each pixel on the positive side of `value`, from its own gradient: an anti-aliased step on its zero."""
     down, right = np.gradient(value)
-    return np.clip(0.5 + value / np.maximum(np.hypot(down, right), 1e-9), 0, 1).astype(np.float32)
+    share = np.clip(0.5 + value / np.maximum(np.hypot(down, right), 1e-9), 0, 1)
+    return np.asarray(share, np.float32)
 
 
 class Background:
@@ -71,7 +75,9 @@ class Background:
     def colour(self, y: Array, z: Array, eye_y: float) -> Array:
         """Colours (h, w, 3) BGR, 0 to 255, seen along directions (1, y, z) from an eye `eye_y` metres to the right."""
         level = z * np.float32(np.cos(self._roll)) + y * np.float32(np.sin(self._roll))
-        sky = self._sky + (20 * sample(self._clouds, y / 2, z / 2) - 30 * z)[..., None] * np.float32([0.6, 0.8, 1.0])
+        sky = self._sky + (20 * sample(self._clouds, y / 2, z / 2) - 30 * z)[..., None] * np.array(
+            [0.6, 0.8, 1.0], np.float32
+        )
         if self._kind == "sky":
             image = sky
         else:

@@ -1,23 +1,26 @@
-"""A piece of blade: a flat or gently bulging strip with two tapering edges and perhaps a tip, in the left camera's frame."""
+"""A piece of blade: a flat or gently bulging strip with two tapering edges and perhaps a tip, in the left camera's
+frame."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from devices.scenes.settings import SceneSettings
 
-Array = NDArray[np.floating]
+Array = NDArray[Any]  # of floats
 
 
 @dataclass(frozen=True)
 class BladePiece:
     """Surface points are `origin + s * along + n * across - curvature * (n - centre)² * normal`.
 
-    `normal` points toward the camera, `along` to the tip. The outline is |n - centre| ≤ half width(s), closed at the tip.
+    `normal` points toward the camera, `along` to the tip. The outline is |n - centre| ≤ half width(s), closed at the
+    tip.
     """
 
     settings: SceneSettings
@@ -26,14 +29,14 @@ class BladePiece:
     def normal(self) -> Array:
         right, down = self.settings.tilt
         normal = np.array([-1.0, right, down])
-        return normal / np.linalg.norm(normal)
+        return np.asarray(normal / np.linalg.norm(normal))
 
     @cached_property
     def along(self) -> Array:
         direction = np.array([0.0, np.cos(self.settings.angle), np.sin(self.settings.angle)])
         right, down = self.settings.tilt
         direction[0] = right * direction[1] + down * direction[2]
-        return direction / np.linalg.norm(direction)
+        return np.asarray(direction / np.linalg.norm(direction))
 
     @cached_property
     def across(self) -> Array:

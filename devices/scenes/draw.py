@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,7 +17,7 @@ from devices.scenes.truth import SceneTruth, scene_truth
 from vision.camera import Camera, LaserGrid, RigGeometry, StereoPair
 from vision.capture import StereoFrames
 
-Array = NDArray[np.float32]
+Array = NDArray[Any]  # of floats
 Image = NDArray[np.uint8]
 
 
@@ -91,7 +92,7 @@ def _draw_eye(
     if settings.glare:
         level += 255 * settings.glare * np.exp(-((slope - 0.1) ** 2) / 0.01)
     level = np.minimum(level, BRIGHTEST)
-    tint = np.float32([0.98, 1.0, 1.01])
+    tint = np.array([0.98, 1.0, 1.01], np.float32)
     image = background.colour(y, z, eye_y)
     image += (level[..., None] * tint - image) * inside[..., None]
     return image
@@ -114,7 +115,7 @@ def _draw_dots(
     for (u, v), power, point in zip(uv, strength, truth.points, strict=True):
         if not np.isfinite(u):
             continue
-        left, top = int(round(u)) - reach, int(round(v)) - reach
+        left, top = round(u) - reach, round(v) - reach
         box = (
             slice(max(top, 0), min(top + 2 * reach + 1, height)),
             slice(max(left, 0), min(left + 2 * reach + 1, width)),
@@ -122,9 +123,9 @@ def _draw_dots(
         dy, dx = np.mgrid[box].astype(np.float64) - np.array([v, u])[:, None, None]
         a, b = dx * np.cos(way) + dy * np.sin(way), dy * np.cos(way) - dx * np.sin(way)
         spot = np.exp(-0.5 * ((a / (sigma * settings.dot_streak)) ** 2 + (b / sigma) ** 2))
-        local = float(clean[min(max(int(round(v)), 0), height - 1), min(max(int(round(u)), 0), width - 1)].mean()) / 255
+        local = float(clean[min(max(round(v), 0), height - 1), min(max(round(u), 0), width - 1)].mean()) / 255
         level = settings.dot_level * power * (0.15 + 0.85 * local) * min((settings.distance_m / point[0]) ** 2, 1.0)
-        image[box] += (level * spot)[..., None].astype(np.float32) * np.float32([0.12, 1.0, 0.10])
+        image[box] += (level * spot)[..., None].astype(np.float32) * np.array([0.12, 1.0, 0.10], np.float32)
     return image
 
 
@@ -132,7 +133,7 @@ def _moved(clean: Array, settings: SceneSettings) -> Array:
     if not any(settings.motion_px):
         return clean
     dx, dy = (value * settings.scale / 4 for value in settings.motion_px)
-    shift = np.float32([[1, 0, dx], [0, 1, dy]])
+    shift = np.array([[1, 0, dx], [0, 1, dy]], np.float32)
     moved = cv2.warpAffine(clean, shift, clean.shape[1::-1], flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(moved, np.float32)
 

@@ -9,17 +9,20 @@ import numpy as np
 
 View = Literal["two_edges", "one_edge", "wrong_side", "no_edge", "tip"]
 TipShape = Literal["round", "square", "spike"]
+Behind = Literal["sky", "ground", "horizon", "clutter", "tower", "blade"]
 VIEWS: tuple[View, ...] = ("two_edges", "one_edge", "wrong_side", "tip")
 
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """One scene. Angles in radians, lengths in metres, brightness 0 to 255; pixels (`_px`) are of a 612 pixels wide image.
+    """One scene. Angles in radians, lengths in metres, brightness 0 to 255; pixels (`_px`) are of a 612 pixels wide
+    image.
 
-    angle: direction of the blade's axis in the image, clockwise from +y_im; with a tip, the tip lies that way. centre_m: offset
-    of the blade's middle line from the optical axis across the blade. taper: change of each half width per metre of axis.
-    tip_m: from the optical axis along the blade to its end, None without. curvature: 1/m, of the surface across the axis.
-    motion_px (2,): shift of the laser-off images against the laser-on images, of the *full* image.
+    angle: direction of the blade's axis in the image, clockwise from +y_im; with a tip, the tip lies that way.
+    centre_m: offset of the blade's middle line from the optical axis across the blade. taper: change of each half
+    width per metre of axis.
+    tip_m: from the optical axis along the blade to its end, None without. curvature: 1/m, of the surface across the
+    axis. motion_px (2,): shift of the laser-off images against the laser-on images, of the *full* image.
     """
 
     seed: int = 0
@@ -42,7 +45,7 @@ class SceneSettings:
     shade: float = 0.2  # relative change of brightness over the image
     dirt: float = 0.2
     glare: float = 0.0
-    background: Literal["sky", "ground", "horizon", "clutter", "tower", "blade"] = "horizon"
+    background: Behind = "horizon"
     dot_level: float = 110.0
     dot_sigma_px: float = 1.4
     dot_streak: float = 1.0
@@ -63,7 +66,7 @@ def random_settings(
     baseline_m: float | None = None,
     brightness: float | None = None,
     motion: bool = False,
-    background: Literal["sky", "ground", "horizon", "clutter", "tower", "blade"] | None = None,
+    background: Behind | None = None,
 ) -> SceneSettings:
     """Settings drawn reproducibly from `seed`; what is given is held."""
     rng = np.random.default_rng([seed, 7])
@@ -98,7 +101,7 @@ def random_settings(
     half = max(chord / 2, 0.3)
     motion_way = u(0, 2 * np.pi)
     motion_size = u(5, 30) if motion else 0.0
-    backgrounds = ("sky", "ground", "horizon", "clutter", "tower", "blade")
+    backgrounds: tuple[Behind, ...] = ("sky", "ground", "horizon", "clutter", "tower", "blade")
     drawn_background = backgrounds[int(rng.integers(len(backgrounds)))]
     drawn_brightness = u(25, 235)
     drawn_colour = bool(rng.uniform() < 0.7)
@@ -115,15 +118,15 @@ def random_settings(
         taper=(float(u(-0.03, 0.03)), float(u(-0.03, 0.03))),
         curvature=float(rng.choice([0.0, u(0, 0.06) / half**2])),
         tip_m=None if tip is None else float(tip),
-        tip_shape=("round", "square", "spike")[int(rng.integers(3))],  # type: ignore[arg-type]
+        tip_shape=("round", "square", "spike")[int(rng.integers(3))],
         baseline_m=float(baseline),
         laser_position_m=laser,
-        distortion=(float(u(-0.08, 0.04)), float(u(-0.03, 0.03)), 0.0, 0.0) if rng.uniform() < 0.5 else (0.0,) * 4,  # type: ignore[arg-type]
+        distortion=(float(u(-0.08, 0.04)), float(u(-0.03, 0.03)), 0.0, 0.0) if rng.uniform() < 0.5 else (0.0,) * 4,
         brightness=float(drawn_brightness if brightness is None else brightness),
         shade=float(u(0, 0.5)),
         dirt=float(u(0, 0.35)),
         glare=float(rng.choice([0.0, u(0, 0.3)])),
-        background=drawn_background if background is None else background,  # type: ignore[arg-type]
+        background=drawn_background if background is None else background,
         dot_level=float(u(70, 170)),
         dot_sigma_px=float(u(1.0, 2.1)),
         dot_streak=float(rng.choice([1.0, 1.0, u(1, 2)])),

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EdgeTruth:
-    """A straight edge as the left image shows it: its tangent where it is nearest to the image centre, and `outward`."""
+    """A straight edge as the left image shows it: its tangent where it is nearest to the image centre, and
+    `outward`."""
 
     line: Line
     outward: Array
@@ -26,11 +27,12 @@ class EdgeTruth:
 
 @dataclass(frozen=True)
 class SceneTruth:
-    """All of it at the instant of the laser-on images, in pixels of the left image and metres of the left camera's frame.
+    """All of it at the instant of the laser-on images, in pixels of the left image and metres of the left camera's
+    frame.
 
     points (n, 3) with rows and columns as in `dots_left`/`dots_right`: NaN where an eye does not see the dot.
-    on_blade (n,): false for dots on what stands behind. distance_m: None where the optical axis misses the surface's outline.
-    tip_point_px (2,): image frame, None where it is not in view. heading: toward the tip, image frame.
+    on_blade (n,): false for dots on what stands behind. distance_m: None where the optical axis misses the surface's
+    outline. tip_point_px (2,): image frame, None where it is not in view. heading: toward the tip, image frame.
     """
 
     row: NDArray[np.int64]

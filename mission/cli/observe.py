@@ -101,7 +101,9 @@ def _observed(images: Path, loaded: dict[str, Image], geometry: RigGeometry | No
     try:
         if geometry is None or "left" not in loaded:
             return observe_single(loaded["left_laser"], geometry)
-        return Eye(geometry).observe(StereoFrames(0.0, **loaded))
+        left, right, left_laser, right_laser = (loaded.get(name) for name in NAMES)
+        frames = StereoFrames(0.0, left, right, left_laser, right_laser)
+        return Eye(geometry).observe(frames)
     except ValueError as error:
         raise CommandError(f"{images}: {error}") from None
 
@@ -125,7 +127,7 @@ def _geometry(path: Path) -> RigGeometry:
         raise MissionFileError(sources.problems)
     if parts.camera is None and parts.camchain is None:
         raise CommandError(f"{path}: names no camera and no camchain, so its pixels cannot become metres")
-    rig = RigFile.model_construct(camera=parts.camera, camchain=parts.camchain, laser=parts.laser)
+    rig = RigFile.model_construct(kind="hardware", camera=parts.camera, camchain=parts.camchain, laser=parts.laser)
     try:
         return rig_geometry(rig, path.parent)
     except (ValueError, OSError) as error:
@@ -186,8 +188,12 @@ def as_document(seen: BladeObservation) -> dict[str, Any]:
     """The observation as JSON: angles in degrees, pixels of the full image, metres in the camera frame."""
     import numpy as np
 
-    degrees = lambda value: None if value is None else float(np.rad2deg(value))  # noqa: E731
-    listed = lambda array: None if array is None else np.asarray(array, float).tolist()  # noqa: E731
+    def degrees(angle: float | None) -> float | None:
+        return None if angle is None else float(np.rad2deg(angle))
+
+    def listed(array: Any) -> list[Any] | None:
+        return None if array is None else list(np.asarray(array, float).tolist())
+
     return {
         "valid": seen.valid,
         "reasons": list(seen.reasons),

@@ -18,11 +18,11 @@ VISIBLE_PX = 120.0  # a shorter stretch of an edge need not be found
 class Verdict:
     """One scene. Pixels are of a 2448 pixels wide image, as the figures asked for are; lengths in metres.
 
-    dots_*: counts of true dots on the blade, found among them, reported, wrong. dot_px: their errors. depth_error: relative, of
-    the mean distance, depth_z: over its claimed sigma, point_sigma_m: of single points against the truth. edge_errors: (degrees,
-    px) of every reported edge, edges_due: how many ought to be found. heading_deg: error. tip_m: error along the axis, NaN where
-    a tip in view was missed, None where there is none; false_tip. unsaid: an edge off by more than 3° or a distance by more than
-    10 % while valid. angle_deg: of the blade.
+    dots_*: counts of true dots on the blade, found among them, reported, wrong. dot_px: their errors. depth_error:
+    relative, of the mean distance, depth_z: over its claimed sigma, point_sigma_m: of single points against the
+    truth. edge_errors: (degrees, px) of every reported edge, edges_due: how many ought to be found. heading_deg:
+    error. tip_m: error along the axis, NaN where a tip in view was missed, None where there is none; false_tip.
+    unsaid: an edge off by more than 3° or a distance by more than 10 % while valid. angle_deg: of the blade.
     """
 
     view: str
