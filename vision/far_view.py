@@ -56,12 +56,7 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -
         image = np.asarray(cv2.resize(image, (small.width, small.height), interpolation=cv2.INTER_AREA), np.uint8)
     picture = _picture(image, small)
     near, within = (expected.hub / factor, 4 * expected.sigma_px / factor) if expected is not None else (None, np.inf)
-    starts = [start_of(guess) for guess in guesses(picture.planes, near, within)]
-    settled_on = [settled(picture, start) for start in starts]
-    if max((agreed for _, agreed in settled_on), default=1.0) < CLEAR_AGREEMENT:
-        # One edge was taken for a line of the background, which a wider search among all six finds out.
-        settled_on += [settled(picture, start, rounds=6, tries=500, breadth=1.8) for start in starts[:2]]
-    settled_on.sort(key=lambda found: -found[1])
+    settled_on = _settled(picture, [start_of(guess) for guess in guesses(picture.planes, near, within)])
     fits = [fit_rotor(picture, *found) for found in settled_on[:MOST_FITS]]
     elapsed = {"far_view": (time.perf_counter() - started) * 1e3}
     if not fits:
@@ -104,6 +99,19 @@ def _picture(image: Image, camera: Camera) -> Picture:
 
 def _merit(fit: Fit) -> float:
     return fit.agreement if np.isfinite(fit.hub_sigma_px) else 0.0
+
+
+def _settled(picture: Picture, starts: list[Array]) -> list[tuple[Array, float]]:
+    """Where the guesses settle, with the share of edges that the picture agrees with, the best first."""
+    found: list[tuple[Array, float]] = []
+    for start in starts:
+        found.append(settled(picture, start))
+        if found[-1][1] > CLEAR_AGREEMENT:
+            # All six edges are there: nothing else in the picture can be as good.
+            return [found[-1]]
+    # One edge was taken for a line of the background, which a wider search among all six finds out.
+    found += [settled(picture, start, rounds=6, tries=500, breadth=1.8) for start in starts[:2]]
+    return sorted(found, key=lambda pair: -pair[1])
 
 
 def _doubts(fit: Fit, camera: Camera) -> list[str]:
