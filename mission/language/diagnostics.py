@@ -11,6 +11,9 @@ from mission.language.codes import CODES, Level
 from mission.language.location import Location
 
 
+_LONGEST = 600
+
+
 @dataclass(frozen=True)
 class Diagnostic:
     """One finding at one place. `hint` says what would be right."""
@@ -27,7 +30,7 @@ class Diagnostic:
 
     def __str__(self) -> str:
         hint = f" ({self.hint})" if self.hint else ""
-        return f"{self.location}: {self.code} {printable(self.message)}{printable(hint)}"
+        return f"{printable(str(self.location))}: {self.code} {printable(self.message)}{printable(hint)}"
 
     def as_json(self) -> dict[str, object]:
         """The fields of `--json`."""
@@ -60,7 +63,9 @@ class MissionFileError(ValueError):
 
 
 def printable(text: str) -> str:
-    """Text with control characters written out, so that a file cannot play with somebody's terminal."""
+    """Text with control characters written out and cut short, so that a file cannot play with somebody's terminal."""
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mission.language.diagnostics import Diagnostic, suggestion
+from mission.language.diagnostics import Diagnostic, printable, suggestion
 from mission.language.location import Location
 from mission.language.tree import Entry, Items, Node, Scalar, Table, merge
 from mission.language.yaml_text import LONGEST_TEXT, UnreadableError, allowances, parse
@@ -61,8 +61,8 @@ class Sources:
                 raise UnreadableError(
                     Diagnostic(asked or Location(file, 1, 1), "M102", f"more than {_MOST_FILES} files are included")
                 )
-            if path.resolve() in chain:
-                circle = " → ".join(shown(link) for link in (*chain[chain.index(path.resolve()) :], path))
+            if (real := _real(path)) in chain:
+                circle = " → ".join(shown(link) for link in (*chain[chain.index(real) :], path))
                 raise UnreadableError(
                     Diagnostic(asked or Location(file, 1, 1), "M102", f"files include each other: {circle}")
                 )
@@ -72,7 +72,7 @@ class Sources:
         except UnreadableError as error:
             self.problems.append(error.diagnostic)
             return None
-        return self._composed(table, path.parent, (*chain, path.resolve()))
+        return self._composed(table, path.parent, (*chain, _real(path)))
 
     def _composed(self, node: Table, folder: Path, chain: tuple[Path, ...]) -> Table:
         entries: dict[str, Entry] = {}
@@ -114,8 +114,8 @@ def read_text(path: Path, asked: Location | None = None) -> str:
     """
     file = shown(path)
     place = Location(file, 1, 1)
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist" if not path.exists() else "is not a plain file"
+    what = _no_file(path)
+    if what:
         hint = _near_file(path)
         if asked is None:
             raise UnreadableError(Diagnostic(Location(file, 0, 0), "M001", f"the file {what}", hint))
@@ -140,7 +140,7 @@ def read_text(path: Path, asked: Location | None = None) -> str:
 
 def mission_root(path: Path) -> Path:
     """The folder whose files a mission may use: the one called `missions` around it, or else the mission's own."""
-    folder = path.resolve().parent
+    folder = _real(path).parent
     return next((parent for parent in (folder, *folder.parents) if parent.name == "missions"), folder)
 
 
@@ -152,7 +152,26 @@ def shown(path: Path) -> str:
         tidy = Path(*parts)
         return str(tidy.relative_to(Path.cwd())) if tidy.is_relative_to(Path.cwd()) else str(path)
     except (OSError, ValueError):
-        return str(path)
+        return printable(str(path))
+
+
+def _real(path: Path) -> Path:
+    """The path with links followed, where that is possible."""
+    try:
+        return path.resolve()
+    except (OSError, ValueError, RuntimeError):
+        return path
+
+
+def _no_file(path: Path) -> str:
+    """Why a path is no plain file; empty where it is one."""
+    try:
+        if path.is_file():
+            return ""
+        return "is a folder" if path.is_dir() else "does not exist" if not path.exists() else "is not a plain file"
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        return f"cannot be looked for: {reason.lower()}"
 
 
 def _near_file(path: Path) -> str:

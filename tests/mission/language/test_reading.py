@@ -127,3 +127,19 @@ def test_control_characters_in_names_do_not_reach_the_terminal(tmp_path: Path) -
     examination = examined(tmp_path, text)
     assert examination.errors
     assert all(str(finding).isprintable() for finding in examination.diagnostics)
+
+
+@pytest.mark.parametrize("name", ["a" * 5000, "a/" * 3000 + "b", "sites", ".", "file:///etc/passwd", "~", "[x]", "7"])
+def test_a_name_that_is_no_file_is_one_readable_line(tmp_path: Path, name: str) -> None:
+    text = SMALL.replace("turbines/v80.yaml", name)
+    examination = examined(tmp_path, text)
+    assert examination.errors and {finding.location.line for finding in examination.errors} == {3}
+    assert all(len(str(finding)) < 2000 and "\n" not in str(finding) for finding in examination.diagnostics)
+
+
+def test_a_command_line_that_is_no_file_is_one_readable_line() -> None:
+    from mission.language.loading import examine
+
+    for path in ("a" * 5000, "x\0y", "", "/proc/self/mem"):
+        finding = only(examine(Path(path)))
+        assert finding.code == "M001" and str(finding).isprintable() and len(str(finding)) < 2000
