@@ -15,7 +15,7 @@ from vision.observation import FarView
 
 Array = NDArray[np.float64]
 
-ATTITUDE_SIGMA = 0.006  # rad, of the camera's angles as telemetry reports them, beside the compass's constant error
+ATTITUDE_SIGMA = 0.002  # rad, of the camera's angles as telemetry reports them, beside the compass's constant error
 COMPASS_SIGMA = np.deg2rad(1.5)
 SAME_PLACE_M = 1.5  # pictures taken nearer to one another than this err together
 OUTLIER = 4.0  # sigmas beyond which a picture contradicts the others

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 class SurveyTurbine(Parameters):
     """Parameters of `survey_turbine`."""
 
-    distance_m: float = Field(48.0, ge=30, le=80, description="of the two far viewpoints, in front of the hub")
+    distance_m: float = Field(64.0, ge=30, le=80, description="of the two far viewpoints, in front of the hub")
     baseline_m: float = Field(24.0, ge=6, le=60, description="between these, to the side")
-    near_m: float = Field(30.0, ge=25, le=60, description="distance of a third; it tells the compass's error apart")
+    near_m: float = Field(36.0, ge=30, le=60, description="distance of a third; it tells the compass's error apart")
     pictures: int = Field(4, ge=1, le=20, description="pictures at each viewpoint")
     speed_m_s: float = Field(6.0, gt=0, le=10, description="speed between the viewpoints")
 
@@ -44,7 +44,16 @@ async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
         await fly_to(services, place, yaw, speed_m_s=parameters.speed_m_s, tolerance_m=1.0)
         for _ in range(parameters.pictures):
             found = await services.perception.far_view()
-            services.log.info("far_view", valid=found.view.valid, reasons=list(found.view.reasons))
+            hub = found.view.hub
+            services.log.info(
+                "far_view",
+                t=round(services.clock.now(), 3),
+                valid=found.view.valid,
+                reasons=list(found.view.reasons),
+                hub_px=None if hub is None else [round(float(v), 1) for v in hub],
+                camera=[round(float(v), 3) for v in found.pose.position],
+                axis=[round(float(v), 5) for v in found.pose.rotation[:, 0]],
+            )
             if found.view.valid:
                 sights.append(found)
             await services.clock.sleep(0.3)
