@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from mission.language.codes import CODES, Level
 from mission.language.location import Location
 
-
 _LONGEST = 600
 
 
