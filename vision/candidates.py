@@ -174,7 +174,9 @@ def _support(profile: Profiles, low: Array, high: Array) -> tuple[NDArray[np.boo
 def _beside(dots: Array, normal: Array) -> tuple[Array, Array]:
     """The stretch (low, high) (k,) of each line that has dots beside it."""
     along = dots @ np.stack([-normal[:, 1], normal[:, 0]])
-    return np.quantile(along, 0.04, axis=0), np.quantile(along, 0.96, axis=0)
+    along.sort(axis=0)
+    few = round(0.04 * (len(along) - 1))
+    return along[few], along[len(along) - 1 - few]
 
 
 def _typical_step(profile: Profiles, beside: NDArray[np.bool_]) -> Array:
@@ -235,7 +237,10 @@ def _blocked(
     u = points[..., 0, None] - inward * profile.normal[:, 0, None, None] + centre[0]
     v = points[..., 1, None] - inward * profile.normal[:, 1, None, None] + centre[1]
     change = np.abs(steps(sampled(smooth, u, v)))
-    depth = profile.rho[:, None] - np.quantile(blade.dots @ profile.normal.T, 0.85, axis=0)[:, None]
+    depth = (
+        profile.rho[:, None]
+        - np.sort(blade.dots @ profile.normal.T, axis=0)[round(0.85 * (len(blade.dots) - 1)), :, None]
+    )
     within = inward[1:-1] < np.maximum(depth - 3, 0)
     strongest = np.where(within[:, None], change, 0).max(axis=2)
     threshold = np.maximum(np.maximum(0.7 * step, 1.7 * blade.texture), 3.0 * noise)

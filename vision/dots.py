@@ -16,7 +16,7 @@ Array = NDArray[Any]  # of floats
 NEIGHBOURHOOD = 7  # px of the half-size image, what a dot is compared with; about half the spacing of the grid
 REACH = 4  # px, half the window of the centroid
 LIFT = 48  # grey levels added to the difference, so that noise below zero is not lost
-MOST = 220  # candidates kept, the strongest; the grid has 121 dots
+MOST = 180  # candidates kept, the strongest; the grid has 121 dots
 LARGEST_MOTION = 12.0  # px between laser-off and laser-on
 
 

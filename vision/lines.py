@@ -27,8 +27,8 @@ SLOPE_HELD, BEND_HELD = 0.05, 1e-4  # what a fit of few steps is held to: slope,
 def sensor_noise(tones: Image) -> float:
     """Standard deviation of the noise in grey levels, from what neighbours do not share in the quiet half of the
     image."""
-    part = tones[::2, :, 0]
-    rough = part[:, 1:-1:5].astype(np.int16) * 2 - part[:, :-2:5] - part[:, 2::5]
+    part = tones[1::4, :, 0]
+    rough = part[:, 1:-1:7].astype(np.int16) * 2 - part[:, :-2:7] - part[:, 2::7]
     return max(0.6, 1.4826 * float(np.median(np.abs(rough))) / float(np.sqrt(6.0)))
 
 
