@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN    := $(VENV)/bin
 MISSION ?= missions/v80_blade.yaml
 
-.PHONY: help run test check bench campaign clean
+.PHONY: help run test check schema bench campaign clean
 
 help:            ## this list
 	@grep -E '^[a-z]+: .*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -29,6 +29,9 @@ check: $(VENV)/.dev ## formatting, lint and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+schema: $(VENV)/.run ## bring the schema that editors check missions with up to date
+	$(BIN)/mission schema > build.schema.json && mv build.schema.json mission/language/mission.schema.json
 
 bench: $(VENV)/.dev ## speed and accuracy, with plots in logs/bench
 	$(BIN)/python -m tests.bench $(ARGS)

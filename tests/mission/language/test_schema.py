@@ -16,7 +16,7 @@ from mission.language.tree import plain
 from mission.language.yaml_text import parse
 from tests.mission.language.missions import MISSIONS
 
-REMEDY = "run: mission schema > mission/language/mission.schema.json"
+REMEDY = "run: make schema"
 
 
 @pytest.fixture(scope="module")
