@@ -15,7 +15,7 @@ from vision.surface import Surface
 
 Array = NDArray[Any]  # of floats
 
-CANDIDATES = 24
+CANDIDATES = 30
 LEAST_SUPPORT = 0.5
 INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
@@ -141,7 +141,8 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
             + 0.35 * float(np.clip(np.log2(step[k] / max(blade.texture, 1.0)), -2.0, 1.0))
             + (0.2 if np.isnan(told) else 0.6 * told if told > 0.5 else -7.0 * (0.5 - told))
             - 2.0 * blocked[k]
-            - 2.5 * empty
+            - 3.0 * max(blocked[k] - 0.5, 0.0)
+            - (4.0 if blade.grid_known else 2.5) * empty
             - 5.0 * crossed[k]
             + 0.15 * min(beyond, 6)
         )

@@ -48,15 +48,25 @@ def _half(image: Image) -> Image:
 
 
 def _motion(off: Image, on: Image) -> Array:
-    small = [_half(image) for image in (off, on)]
-    quiet = _difference(small[0], small[1], np.zeros(2))
-    first, second = (image.astype(np.float32) for image in small)
-    window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
-    shift, _ = cv2.phaseCorrelate(first, second, window)
-    motion = np.array(shift)
+    """The shift between half-size images: coarse at half their size, then fine at their own."""
+    small = [cv2.blur(_half(image), (3, 3)) for image in (off, on)]
+    motion = _correlated(small[0], small[1])
     if not 0.05 < np.hypot(*motion) < LARGEST_MOTION / 4:
         return np.zeros(2)
-    return motion * 2 if _difference(small[0], small[1], motion) < 0.9 * quiet else np.zeros(2)
+    if _difference(small[0], small[1], motion) > 0.95 * _difference(small[0], small[1], np.zeros(2)):
+        return np.zeros(2)
+    coarse = 2 * motion
+    moved = shifted(off, coarse)
+    rest = _correlated(moved, on)
+    if np.hypot(*rest) < 1.5 and _difference(off, on, coarse + rest) < _difference(moved, on, np.zeros(2)):
+        return coarse + rest
+    return coarse
+
+
+def _correlated(first: Image, second: Image) -> Array:
+    window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
+    shift, _ = cv2.phaseCorrelate(first.astype(np.float32), second.astype(np.float32), window)
+    return np.array(shift)
 
 
 def _difference(off: Image, on: Image, shift: Array) -> float:

@@ -130,7 +130,7 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
     table = votes.reshape(ANGLES, bins).astype(np.float32)
     wrapped = np.vstack([table[-2:, ::-1], table, table[:2, ::-1]])
     wrapped = cv2.blur(wrapped, (3, 1))
-    highest = cv2.dilate(wrapped, np.ones((5, 5), np.uint8))
+    highest = cv2.dilate(wrapped, np.ones((3, 5), np.uint8))
     peaks = (wrapped == highest)[2:-2] & (wrapped[2:-2] > 4)
     a, r = np.nonzero(peaks)
     strength = wrapped[2:-2][a, r].astype(float)
