@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from devices.world.nearest import distances
 from devices.world.raycast import cast
 from devices.world.silhouette import edges, outlines
-from devices.world.turbine import INSPECTED, TurbineShape
+from devices.world.turbine import BLADES, INSPECTED, TurbineShape
 from vision.camera import Camera
 from vision.capture import CameraPose, camera_pose, rotation_of
 
@@ -28,6 +28,7 @@ Side = Literal["leading", "trailing"]
 COLLISION_M = 0.6  # half the span of the simulated vehicle's frame with its propellers
 SHARP = 0.3  # sharpness below which a frame does not count
 STATION_STEP_M = 0.1
+FOLLOWED_M = 8.0  # a blade that is followed is nearer than this
 SELF_M = 0.5  # the blade itself hides an edge point only from farther away than this along the ray
 
 
@@ -94,10 +95,7 @@ def flight_truth(
     armed = flight.position[flight.armed]
     nearest = float(distances(shape.mesh, armed).min()) if len(armed) else None
     lens = _lens(flight, mount)
-    during = np.zeros(len(flight.t), bool)
-    for one in passes:
-        during |= (flight.t >= one.start_s) & (flight.t <= one.end_s)
-    standoff = distances(shape.mesh, lens[during], (INSPECTED,))
+    standoff = _standoff(flight, shape, lens, passes)
     error = standoff - target_m if target_m is not None and len(standoff) else None
     sides = sorted({one.side for one in passes} | {one.side for one in photographs})
     return {
@@ -109,6 +107,24 @@ def flight_truth(
         "tip_error_m": None if tip_radius_m is None else abs(tip_radius_m - shape.blade.tip_radius_m),
         "coverage": {side: coverage(flight, shape, camera, mount, photographs, side) for side in sides},
     }
+
+
+def _standoff(flight: Flight, shape: TurbineShape, lens: Array, passes: Sequence[Pass]) -> Array:
+    """Distances (n,) of the lens from the blade during the passes. A mission may take several blades in turn: a pass
+    belongs to the blade that it was nearest to, by the median."""
+    found: list[Array] = []
+    for one in passes:
+        during = lens[(flight.t >= one.start_s) & (flight.t <= one.end_s)]
+        if len(during) == 0:
+            continue
+        best = distances(shape.mesh, during, (INSPECTED,))
+        for other in BLADES[1:]:
+            # Near the hub all three are near; a pass over half a blade is unmistakable.
+            if np.median(best) > FOLLOWED_M:
+                candidate = distances(shape.mesh, during, (other,))
+                best = candidate if np.median(candidate) < np.median(best) else best
+        found.append(best)
+    return np.concatenate(found) if found else np.empty(0)
 
 
 def _lens(flight: Flight, mount: Array) -> Array:
