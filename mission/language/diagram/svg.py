@@ -95,8 +95,7 @@ def _box(mission: Mission, box: Box, page: Layout, painting: Painting | None) ->
             f'<text x="{after}" y="{y}" font-size="10" fill="#9a5b00" font-weight="bold">'
             f"{times}{visit.seconds:.1f} s</text>"
         )
-        after += 60
-    if box.details:
+    elif box.details:
         parts.append(f'<text x="{after:.1f}" y="{y}" font-size="10" fill="#555">{escape(box.details)}</text>')
     return "".join(parts)
 
