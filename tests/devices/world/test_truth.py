@@ -1,6 +1,7 @@
 """The truth of a flight, on flights whose truth is known beforehand."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from devices.world.settings import SurveyError
 from devices.world.truth import Flight, Pass, Photograph, coverage, flight_truth, truth_of_run
 from devices.world.turbine import TurbineShape
 from vision.camera import Camera
+from vision.capture import rotation_of
 
 CAMERA = Camera(612, 512, 616.0, 616.0, 305.5, 255.5)
 MOUNT = np.array([0.12, 0.0, 0.05])
@@ -61,6 +63,23 @@ def test_standoff_is_measured_from_the_lens_and_only_during_the_passes(shape):
         np.sqrt(np.mean((np.array([truth["standoff_min_m"], truth["standoff_max_m"]]) - 3.0) ** 2)), abs=0.15
     )
     assert flight_truth(flight, shape, CAMERA, MOUNT)["standoff_rmse_m"] is None
+
+
+@pytest.mark.parametrize("turn", [0.0, 120.0, 240.0])
+def test_a_pass_is_measured_to_the_blade_that_it_followed(shape, turn):
+    flight = along_the_blade(shape, np.linspace(8.0, 36.0, 29), 3.0 + MOUNT[0])
+    # The same way before another blade: turned about the rotor's axis, which all three share.
+    axis = shape.rotation @ rotation_of(0.0, -np.deg2rad(5.0), 0.0)[:, 0]
+    around = flight.position - shape.hub
+    angle = np.deg2rad(turn)
+    turned = (
+        around * np.cos(angle)
+        + np.cross(axis, around) * np.sin(angle)
+        + np.outer(around @ axis, axis) * (1 - np.cos(angle))
+    )
+    same = replace(flight, position=shape.hub + turned)
+    truth = flight_truth(same, shape, CAMERA, MOUNT, passes=[Pass(0.0, 28.0, "leading")], target_m=3.0)
+    assert 2.2 < truth["standoff_min_m"] < truth["standoff_max_m"] < 3.2
 
 
 def test_a_claimed_tip_is_held_against_the_true_radius(shape):
