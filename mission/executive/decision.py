@@ -44,7 +44,8 @@ def decide(
 
 def needs_yes(name: str, transition: Transition, autonomy: Autonomy) -> bool:
     """Whether an operator is asked first. Never for what is urgent, nor for what an operator wants himself."""
-    if autonomy == "full" or event(name).severity is not Severity.INFO:
+    urgent = any(event(other).severity is not Severity.INFO for other in (name, transition.event))
+    if autonomy == "full" or urgent:
         return False
     return autonomy == "manual" or transition.confirm
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mission.executive.decision import autonomy_after, decide
-from mission.executive.events import EventError
+from mission.executive.events import EventError, event
 from mission.executive.journal import Entry, read_journal
 from mission.executive.machine import Machine
 from mission.executive.machine import entries as skips
@@ -93,9 +93,10 @@ class _Player:
         )
         guards: dict[str, Any] = dict(fields.get("guards", {}))
         try:
-            decision = decide(self.mission, self.machine.configuration, queued, guards, self.autonomy)
+            event(name)
         except EventError as error:
             return played(str(error))
+        decision = decide(self.mission, self.machine.configuration, queued, guards, self.autonomy)
         if decision.led_to != was:
             return played(f"recorded as {was}, now {decision.led_to}")
         if decision.led_to != "transition" or decision.transition is None:

@@ -29,17 +29,18 @@ class Watcher:
 
     def look(self) -> None:
         """One round of all monitors. One that fails raises `abort`: flying on blind is not an option."""
-        snapshot = self._snapshot(self._was_ours)
+        try:
+            snapshot = self._snapshot(self._was_ours)
+        except Exception as error:
+            self._fails("snapshot", error)
+            return
         telemetry = snapshot.telemetry
         self._was_ours = telemetry.in_air and (self._was_ours or telemetry.flight_mode not in STICKS)
         for name, monitor in monitors().items():
             try:
                 self._watches[name], raised = look(monitor, self._watches[name], snapshot)
             except Exception as error:
-                if name not in self._broken:
-                    self._broken.add(name)
-                    self._log.exception("monitor failed", monitor=name)
-                    self._raise("abort", monitor=name, error=str(error))
+                self._fails(name, error)
                 continue
             if raised is not None:
                 self._raise(raised, **({"excess": round(self._watches[name].worst, 3)} if raised == name else {}))
@@ -48,6 +49,13 @@ class Watcher:
         """Let the event be raised again if its limit is still exceeded: the last time nobody answered it."""
         if name in self._watches:
             self._watches[name] = Watch()
+
+    def _fails(self, name: str, error: Exception) -> None:
+        """Said once; what fails goes on failing."""
+        if name not in self._broken:
+            self._broken.add(name)
+            self._log.exception("monitor failed", monitor=name)
+            self._raise("abort", monitor=name, error=f"{type(error).__name__}: {error}")
 
     async def run(self, clock: Clock) -> None:
         """Until cancelled."""

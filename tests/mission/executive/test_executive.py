@@ -348,6 +348,23 @@ def test_an_error_of_the_executive_itself_becomes_an_abort(fly: Any, monkeypatch
     assert any(kind == "fault" for kind, _ in flight.journal)
 
 
+@pytest.mark.parametrize("broken", ["snapshot", "monitor"])
+def test_monitors_that_fail_bring_the_vehicle_home(fly: Any, monkeypatch: pytest.MonkeyPatch, broken: str) -> None:
+    flight = fly({"fly": {"do": "wait", "on": {"abort": "land"}}, "land": {"do": "finish", "on": {"done": "aborted"}},
+                  **END})  # fmt: skip
+
+    def fails() -> None:
+        raise ZeroDivisionError
+
+    if broken == "snapshot":
+        flight.services.perception.estimate = fails
+    else:
+        flight.autopilot.says(battery_percent="full")
+    assert flight.run().outcome == "aborted"
+    aborts = [fields for kind, fields in flight.journal if kind == "event" and fields["event"] == "abort"]
+    assert len(aborts) >= 1 and "monitor" in aborts[0]["data"]
+
+
 def test_a_loop_that_was_blocked_is_noticed(fly: Any) -> None:
     async def blocking(services: Any, parameters: Any) -> str:
         asyncio.get_running_loop().pass_time(3.0)  # type: ignore[attr-defined]
