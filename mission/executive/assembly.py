@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import nullcontext, suppress
@@ -107,6 +108,8 @@ async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, l
         tasks = [loop.create_task(work, name=name) for name, work in running.items()]
         options.on_start(executive)
         listening = nullcontext() if options.lockstep else serving(executive, options.folder.path)
+        gc.collect()
+        gc.freeze()  # what exists by now stays: looking through it again would stop the setpoints for a tenth of a second
         with interrupting(executive):
             async with listening:
                 outcome = await executive.run()

@@ -38,7 +38,7 @@ class _Library(HierarchicalAsyncMachine):
         """One after the other: a task for each guard would cost more than all guards together."""
         return [await call() for call in callables]
 
-    async def callbacks(self, funcs: Iterable[Any], event_data: Any) -> None:
+    async def callbacks(self, funcs: Iterable[Any], event_data: Any) -> None:  # type: ignore[override, unused-ignore]
         """One after the other, and nothing at all where there are none."""
         for func in funcs:
             await self.callback(func, event_data)
