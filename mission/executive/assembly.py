@@ -109,7 +109,7 @@ async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, l
         options.on_start(executive)
         listening = nullcontext() if options.lockstep else serving(executive, options.folder.path)
         gc.collect()
-        gc.freeze()  # what exists by now stays: looking through it again would stop the setpoints for a tenth of a second
+        gc.freeze()  # what exists by now stays: looking through it again would stop the setpoints for 0.1 s
         with interrupting(executive):
             async with listening:
                 outcome = await executive.run()
