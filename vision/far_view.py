@@ -26,7 +26,8 @@ WORKING_PX = 800  # pictures wider than this are halved
 MODEL_HUB_PX = 1.0  # what equal straight edges leave out: foreshortening, twist, bend
 MODEL_DIRECTION = np.deg2rad(0.4)
 LEAST_SUPPORT = 0.5
-MOST_FITS = 3
+MOST_FITS = 4
+EQUAL_MERIT = 0.95
 CLEAR_AGREEMENT = 0.95  # share of the six edges' length at which no wider search is needed
 
 
@@ -70,14 +71,18 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -
     if reasons:
         return FarView(False, tuple(reasons), elapsed_ms=elapsed)
     hub, directions = _as_drawn(best, small)
+    # Fits nearly as good that say otherwise show how little the picture tells.
+    equals = [fit for fit in order[1:] if _merit(fit) > EQUAL_MERIT * _merit(best) and not _elsewhere(fit, best)]
+    hub_off = max((float(np.linalg.norm(fit.parameters[:2] - best.parameters[:2])) for fit in equals), default=0.0)
+    turn_off = max((_turned(fit, best) for fit in equals), default=0.0)
     turn = np.argsort(directions)
     return FarView(
         True,
         (),
         hub * factor,
-        float(np.hypot(best.hub_sigma_px, MODEL_HUB_PX)) * factor,
+        float(np.hypot(np.hypot(best.hub_sigma_px, MODEL_HUB_PX), hub_off / 2)) * factor,
         directions[turn],
-        np.hypot(best.direction_sigma, MODEL_DIRECTION)[turn],
+        np.hypot(np.hypot(best.direction_sigma, MODEL_DIRECTION), turn_off / 2)[turn],
         elapsed,
     )
 
@@ -98,7 +103,8 @@ def _picture(image: Image, camera: Camera) -> Picture:
 
 
 def _merit(fit: Fit) -> float:
-    return fit.agreement if np.isfinite(fit.hub_sigma_px) else 0.0
+    """Agreement before the last fraction of a pixel, less what the edges then miss the model by."""
+    return fit.agreement - 0.15 * fit.residual_px if np.isfinite(fit.hub_sigma_px) else 0.0
 
 
 def _settled(picture: Picture, starts: list[Array]) -> list[tuple[Array, float]]:
@@ -134,8 +140,13 @@ def _doubts(fit: Fit, camera: Camera) -> list[str]:
 
 
 def _elsewhere(one: Fit, other: Fit) -> bool:
-    turn = np.angle(np.exp(3j * (one.directions[0] - other.directions[0]))) / 3
-    return bool(np.linalg.norm(one.parameters[:2] - other.parameters[:2]) > 25 or abs(turn) > np.deg2rad(8))
+    apart = np.linalg.norm(one.parameters[:2] - other.parameters[:2])
+    return bool(apart > 25 or _turned(one, other) > np.deg2rad(8))
+
+
+def _turned(one: Fit, other: Fit) -> float:
+    """By how much (rad) two rotors are turned against each other, whichever blades correspond."""
+    return abs(float(np.angle(np.exp(3j * (one.directions[0] - other.directions[0]))) / 3))
 
 
 def _as_drawn(fit: Fit, camera: Camera) -> tuple[Array, Array]:
