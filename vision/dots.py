@@ -84,14 +84,17 @@ def shifted(image: Image, motion: Array) -> Image:
     return np.asarray(moved, np.uint8)
 
 
-def find_spots(off: Image, on: Image, reachable: Image | None = None) -> Spots:
+def find_spots(off: Image, on: Image, reachable: Image | None = None, hint: Array | None = None) -> Spots:
     """Spots that are in `on` and not in `off`, both (h, w) uint8 of working size; the strongest MOST of them.
 
-    reachable (h, w): not zero where the laser's dots can be at all. Spots are found in images of half the size and
-    measured in the whole ones.
+    reachable (h, w): not zero where the laser's dots can be at all. hint (2,) px: motion that the other eye
+    found. Spots are found in images of half the size and measured in the whole ones.
     """
     small_off, small_on = _half(off), _half(on)
     motion = 2 * _motion(small_off, small_on)
+    if hint is not None and np.hypot(*(hint - motion)) > 1.0:
+        own, other = (_difference(small_off, small_on, shift / 2) for shift in (motion, hint))
+        motion = hint if other < own else motion
     still = off
     if motion.any():
         small_off, still = shifted(small_off, motion / 2), shifted(off, motion)
@@ -101,7 +104,7 @@ def find_spots(off: Image, on: Image, reachable: Image | None = None) -> Spots:
         for border in (difference[:margin], difference[-margin:], difference[:, :margin], difference[:, -margin:]):
             border[:] = LIFT
     response = cv2.subtract(cv2.blur(difference, (3, 3)), cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
-    typical = float(np.mean(response[::3, ::3]))
+    typical = float(np.mean(np.minimum(response[::3, ::3], 6)))  # what moved against its background tells no noise
     return _centroids(on, still, _peaks(np.asarray(response, np.uint8), max(2.0, 6.0 * typical), reachable), motion)
 
 

@@ -79,7 +79,7 @@ def refocused(edges: tuple[Candidate, ...], tones: Image, station: float, toward
             normal, rho = profile.normal, profile.rho
         near = np.abs(profile.t[0] - place[0]) < 60
         turned = float(normal[0] @ edge.outward)
-        if profile.agrees[0][near].mean() > 0.6 and turned > np.cos(np.deg2rad(25)):
+        if near.any() and profile.agrees[0][near].mean() > 0.6 and turned > np.cos(np.deg2rad(25)):
             result.append(
                 replace(edge, outward=normal[0], rho=float(rho[0]), profile=profile, index=0, ends=run_of(profile, 0))
             )

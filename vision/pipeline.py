@@ -27,6 +27,7 @@ from vision.tip import tip_of
 Array = NDArray[np.float64]
 
 LEAST_DOTS = 4
+LEAST_OTHER = 6  # dots off the fitted surface: fewer are mistakes, as many may be another surface
 SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade
 
 
@@ -67,7 +68,11 @@ class Eye:
         watch.lap("reduce")
         both = "right" in images and "right_laser" in images
         left = find_spots(green(images["left"]), green(images["left_laser"]), self._reachable[0])
-        right = find_spots(green(images["right"]), green(images["right_laser"]), self._reachable[1]) if both else None
+        right = (
+            find_spots(green(images["right"]), green(images["right_laser"]), self._reachable[1], left.motion)
+            if both
+            else None
+        )
         watch.lap("dots")
         laser = self.geometry.laser
         if laser is None:
@@ -92,6 +97,8 @@ class Eye:
         surface = fit_surface(rays[blade.left], blade.inverse_depth, blade.sigma)
         if surface is None:
             return self._refused(frames, watch, f"{len(blade)} dots that make no surface before the camera")
+        if 0 < np.count_nonzero(~surface.inliers) < LEAST_OTHER:
+            matches = _without(matches, blade.take(~surface.inliers))
         blade = blade.take(surface.inliers)
         watch.lap("surface")
         return self._outlined(frames, images, left, right, rays, matches, blade, surface, watch, expected)
@@ -248,6 +255,10 @@ def _blade_of(matches: Matches) -> Matches:
     if not enough.any():
         return matches.take(matches.surface == 0)
     return matches.take(matches.surface == int(np.argmax(np.where(enough, depth, 0))))
+
+
+def _without(matches: Matches, others: Matches) -> Matches:
+    return matches.take(~np.isin(matches.left, others.left))
 
 
 def _station_near(dots: Array, axis: float) -> Array:

@@ -59,7 +59,9 @@ def _last_and_missing(blade: Blade, toward: Array, low: float, high: float) -> t
     seen = blade.dots[np.abs(blade.dots @ across - middle) < 0.5 * (high - low) + 6] @ toward
     gone = np.sort(blade.absent[np.abs(blade.absent @ across - middle) < max(reach, 10.0)] @ toward)
     gone = gone[gone > seen.max() + 3.0] if len(seen) else gone[:0]
-    holes = (blade.absent @ toward < seen.max()) & (np.abs(blade.absent @ across - middle) < reach) if len(seen) else gone
+    holes = (
+        (blade.absent @ toward < seen.max()) & (np.abs(blade.absent @ across - middle) < reach) if len(seen) else gone
+    )
     if len(gone) < 2 or holes.sum() > 0.1 * len(seen):
         return None
     return float(seen.max()), float(gone[0])
