@@ -1,43 +1,27 @@
-"""The executive: one task that owns the machine and carries every event to its end before it looks at the next.
-
-Stop the old behaviour, write the transition to the journal, move the machine, start the new behaviour: in this order.
-"""
+"""The executive: flies a mission to its end, and is what everybody else may call: run, raise, ask, command, look."""
 
 from __future__ import annotations
 
 import asyncio
-from collections import deque
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mission.behaviours.behaviour import behaviours
-from mission.executive import snapshot as snapshots
-from mission.executive.chronicle import Chronicle
-from mission.executive.decision import Autonomy, autonomy_after, decide
-from mission.executive.events import EVENTS, event
-from mission.executive.gate import Gate, guard_services
-from mission.executive.helm import PULSE_S, Helm
+from mission.executive.conductor import Conductor
+from mission.executive.decision import Autonomy
+from mission.executive.events import event
 from mission.executive.journal import Journal
-from mission.executive.machine import Machine, entries
-from mission.executive.question import Ask, Question, Questions
-from mission.executive.queue import EventQueue, Queued
+from mission.executive.machine import entries
+from mission.executive.question import Ask
 from mission.executive.resume import take_up
-from mission.executive.snapshot import Snapshot
-from mission.executive.status import Recent, Status, possible
-from mission.executive.timing import Timing, Waiting
-from mission.executive.watch import Watcher
-from mission.executive.work import Work
-from mission.language import semantics
-from mission.language.document import Mission, Transition
-from mission.language.semantics import Configuration, Quantities
+from mission.executive.status import Status, possible
+from mission.language.document import Mission
+from mission.language.semantics import Configuration
 
 if TYPE_CHECKING:
     from mission.executive.clock import Clock
     from mission.executive.services import Services
-
-KEEP_S = 0.5  # how often the journal is told what a behaviour has found out
-_MOST_FAULTS = 3
 
 
 @dataclass(frozen=True)
@@ -49,7 +33,7 @@ class Outcome:
     interrupted: bool = False
 
 
-class Executive:
+class Executive(Conductor):
     """Flies a mission. `run` returns when the machine is in a final state; no behaviour can end it earlier.
 
     services: put behind a gate, in place, so that an abandoned behaviour cannot steer. ask: how an operator is asked;
@@ -67,35 +51,10 @@ class Executive:
         autonomy: Autonomy = "full",
         resume: Configuration | None = None,
     ) -> None:
-        self.mission, self.services, self.autonomy = mission, services, autonomy
+        super().__init__(mission, services, clock, journal, ask=ask, autonomy=autonomy, resume=resume)
         self.interrupted = False
-        self._clock, self._resumed = clock, resume is not None
-        self._autopilot = services.autopilot
-        self._gate = Gate()
-        self._queue = EventQueue()
-        self._helm = Helm(services, self._gate, lambda gap_s: self.raise_event("setpoints_stalled", gap_s=gap_s))
-        guard_services(services, self._gate)
-        self._machine = Machine(mission, resume)
-        self._work = Work(services, self._gate, self._behaviour_ended)
-        self._watcher = Watcher(self._snapshot, self.raise_event, services.log, airborne=self._resumed)
-        self._chronicle = Chronicle(journal, clock, mission, services)
-        self._questions = Questions(ask, self._answered)
-        self._timing = Timing()
-        self._recent: deque[Recent] = deque(maxlen=8)
-        self._ignored: set[str] = set()
-        self._paused = False
-        self._ended: str | None = None
-        self._faults = 0
-        self._kept_s = 0.0
         self._loop: asyncio.AbstractEventLoop | None = None
         journal.on_lost = self._journal_lost
-
-    # What others call
-
-    @property
-    def state(self) -> str:
-        """Path of the active leaf."""
-        return self._machine.state
 
     async def run(self) -> Outcome:
         """Fly until a final state is reached."""
@@ -124,19 +83,6 @@ class Executive:
             with suppress(asyncio.CancelledError):
                 await watching
 
-    def raise_event(self, name: str, **data: Any) -> None:
-        """Queue an event of the table or an outcome. From the event loop's thread.
-
-        Raises:
-            EventError: nobody declared it.
-        """
-        entry = event(name)
-        if entry.lets_go:
-            self._helm.let_go()
-        if entry.raised_by == "operator" and "by" in data:
-            self.note(name, str(data["by"]), **{key: value for key, value in data.items() if key != "by"})
-        self._queue.put(name, data)
-
     def raise_event_threadsafe(self, name: str, **data: Any) -> None:
         """The same from any thread."""
         event(name)
@@ -148,17 +94,6 @@ class Executive:
         """Ctrl-C, SIGTERM: run the abort path, and say so in the outcome."""
         self.interrupted = True
         self._queue.put("interrupted", {"by": by} if by else {})
-
-    def confirm(self, yes: bool) -> str:
-        """Answer the question that waits; returns what becomes of it, for the operator to read."""
-        pending = self._questions.take()
-        if pending is None:
-            return "nothing waits for an answer"
-        if not yes:
-            return f"{pending.name} is not followed; the vehicle holds in {self.state}"
-        about = {"activation": pending.activation, "origin": pending.origin, "only": pending.only}
-        self._queue.put(pending.name, pending.data, confirmed=True, **about)
-        return f"{pending.name} is followed"
 
     def skip(self, path: str) -> tuple[bool, str]:
         """Go to a state that the mission marks as an entry; returns whether, and the words for the operator."""
@@ -175,10 +110,6 @@ class Executive:
     def answers(self, name: str) -> bool:
         """Whether the event would lead anywhere now."""
         return self._machine.choose(name, self._quantities()) is not None
-
-    def note(self, command: str, who: str, **about: Any) -> None:
-        """Write an operator's act to the journal."""
-        self._chronicle.acts(command, who, **about)
 
     def status(self) -> Status:
         """One glance at the run."""
@@ -205,168 +136,6 @@ class Executive:
             station_m=progress.station_m,
         )
 
-    # The loop
-
-    async def _turn(self) -> None:
-        """Handle one event, or wait for one until something is due."""
-        self._helm.beat()
-        try:
-            await self._act_on_time()
-            queued = self._queue.pop()
-            if queued is not None:
-                await self._handle(queued)
-                return
-        except Exception as error:
-            await self._fault(error)
-        due_s, patience = self._timing.next_s(), PULSE_S
-        if due_s is not None:
-            patience = min(patience, max((due_s - self._clock.now()) / self._clock.speed, 0.0))
-        with suppress(TimeoutError):
-            async with asyncio.timeout(patience):
-                await self._queue.arrived.wait()
-
-    async def _act_on_time(self) -> None:
-        """Deadlines cancel the work that they time; transitions whose delay is over are taken if they still can be."""
-        now = self._clock.now()
-        if now - self._kept_s >= KEEP_S and not len(self._queue):
-            self._kept_s = now
-            self._chronicle.found_out(self.state)
-        late = self._timing.overdue(now)
-        if late is not None:
-            self._timing = self._timing.expired(late)
-            if self._questions.waiting is None:
-                self._queue.put("timed_out", {"state": late}, origin=late)
-                await self._stop()
-                self._helm.hold()
-        ripe = self._timing.due(now)
-        if ripe is not None:
-            self._timing = self._timing.without(ripe)
-            self._queue.put(ripe.event, {}, only=ripe.transition)
-
-    async def _handle(self, queued: Queued) -> None:
-        if queued.activation is not None and queued.activation != self._work.activation:
-            self._chronicle.happened(queued, "stale", self.state, {})
-            return
-        if queued.name == "step" and self._questions.waiting is not None:
-            self._chronicle.happened(queued, "confirmation", self.state, {})
-            self.confirm(True)
-            return
-        quantities = self._quantities() if self._asked(queued) else {}
-        decision = decide(self.mission, self._machine.configuration, queued, quantities, self.autonomy)
-        self._chronicle.happened(queued, decision.led_to, self.state, quantities)
-        transition = decision.transition
-        if decision.led_to == "ignored":
-            self._unanswered(queued)
-        elif transition is None:
-            return
-        elif decision.led_to == "delayed":
-            due_s = self._clock.now() + decision.delay_s
-            self._timing = self._timing.delaying(Waiting(due_s, queued.name, transition))
-        elif decision.led_to == "asked":
-            target = semantics.entered_leaf(self.mission, self._machine.configuration, transition)
-            self._questions.put(replace(queued, only=transition), Question(queued.name, self.state, target))
-        else:
-            await self._go(queued, transition, quantities)
-
-    async def _go(self, queued: Queued, transition: Transition, quantities: Quantities) -> None:
-        """One transition: stop, journal, move, start."""
-        if event(transition.event).lets_go:
-            self._helm.let_go()
-        await self._stop()
-        step = semantics.take(self.mission, self._machine.configuration, transition, queued.name)
-        self._chronicle.steps(step)
-        if self._chronicle.journal.pending:
-            await self._helm.patiently(self._chronicle.journal.durable())
-        await self._machine.take(queued.name, quantities, queued.origin, transition)
-        now = self._clock.now()
-        self._timing = self._timing.stepping(self.mission, step, now)
-        self._questions.take()
-        self._paused = transition.event == "paused"
-        self.autonomy = autonomy_after(transition, self.autonomy)
-        for name in self._ignored:
-            self._watcher.rearm(name)
-        self._ignored.clear()
-        self._recent.append(Recent(now, queued.name, step.after.leaf))
-        self.services.log.info("transition", by=queued.name, state=step.after.leaf, t=round(now, 3))
-        await self._begin()
-        if self._gate.let_go and self._ended is None:
-            self._ended = "released"
-
-    async def _begin(self) -> None:
-        """Start what the active leaf does; without a behaviour, hold."""
-        state = self.mission.states[self.state]
-        self.services.progress.text, self.services.progress.station_m = "", None
-        if state.final is not None:
-            self._ended = state.final
-        elif state.do is None:
-            self._helm.hold()
-        else:
-            self._work.start(behaviours()[state.do], state.parameters)
-
-    async def _stop(self) -> None:
-        if not await self._work.stop(self._helm.beat):
-            self._helm.hold()
-            self._queue.put("behaviour_stuck", {"state": self.state})
-
-    # What happens to it
-
-    def _behaviour_ended(self, activation: int, name: str, data: dict[str, Any]) -> None:
-        self._queue.put(name, data, activation=activation)
-
-    def _answered(self, yes: bool) -> None:
-        self.note("confirm" if yes else "refuse", "operator")
-        self.confirm(yes)
-
-    def _unanswered(self, queued: Queued) -> None:
-        """Nobody answers. A limit is watched again in the next state; a behaviour's last word must not be lost."""
-        self._ignored.add(queued.name)
-        self._recent.append(Recent(self._clock.now(), queued.name, "ignored"))
-        self.services.log.warning("event without answer", name=queued.name, state=self.state)
-        telemetry = self._autopilot.telemetry
-        if event(queued.name).lets_go:
-            self._ended = "released"
-        elif queued.name in ("abort", "interrupted") and not (telemetry.in_air or telemetry.armed):
-            self._ended = "aborted"
-        elif queued.activation is not None and queued.name not in EVENTS:
-            self._queue.put("behaviour_failed", {"error": f"nothing answers its outcome {queued.name!r}"})
-
     def _journal_lost(self, text: str) -> None:
         self.services.log.error("journal lost", text=text)
         self.raise_event_threadsafe("journal_lost", error=text)
-
-    async def _fault(self, error: Exception) -> None:
-        """An error of the executive itself: abort, and if that does not help either, leave the vehicle holding."""
-        self._faults += 1
-        self.services.log.exception("executive failed", state=self.state)
-        self._chronicle.fails(error)
-        if self._faults >= _MOST_FAULTS:
-            await self._stop()
-            self._ended = "aborted"
-        else:
-            self._queue.put("abort", {"error": type(error).__name__})
-
-    # What it sees
-
-    def _snapshot(self, was_ours: bool = True) -> Snapshot:
-        state = self.mission.states[self.state]
-        behaviour = self._work.behaviour
-        keeps = behaviour is not None and behaviour.keeps_standoff
-        return snapshots.take(
-            self.services,
-            entered_s=self._timing.entered_s.get(state.path, 0.0),
-            limits=state.limits or self.mission.limits,
-            needs_vision=behaviour is not None and behaviour.needs_vision and self._work.running,
-            standoff_m=getattr(state.parameters, "standoff_m", None) if keeps else None,
-            was_ours=was_ours,
-        )
-
-    def _asked(self, queued: Queued) -> bool:
-        """Whether any guard has a say in what this event leads to."""
-        handlers = self.mission.handlers(queued.origin or self.state, queued.name)
-        return any(transition.guarded for transition in handlers)
-
-    def _quantities(self) -> dict[str, float | bool | None]:
-        """Values for the guards, rounded as the journal keeps them, so that a replay decides the same."""
-        simulated = self._autopilot.simulated
-        values = snapshots.quantities(self._snapshot(), self.services.memory, simulated=simulated)
-        return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}

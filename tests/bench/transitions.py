@@ -14,7 +14,7 @@ import numpy as np
 
 from flight.autopilot import Telemetry, VehiclePose
 from mission.behaviours.behaviour import behaviours
-from mission.executive import executive as executive_module
+from mission.executive import conductor
 from mission.executive.clock import WallClock
 from mission.executive.executive import Executive
 from mission.executive.journal import Journal
@@ -54,7 +54,7 @@ def table() -> list[str]:
     """Two lines of figures in milliseconds."""
     mission = load("missions/v80_blade.yaml")
     idle = {name: replace(entry, run=wait) for name, entry in behaviours().items()}
-    executive_module.behaviours = lambda: idle  # type: ignore[attr-defined]
+    conductor.behaviours = lambda: idle  # type: ignore[attr-defined]
     with tempfile.TemporaryDirectory() as folder:
         rows = {
             "without disk": measure(mission, None),

@@ -14,7 +14,8 @@ import pytest
 from flight.autopilot import Setpoint, Telemetry, VehiclePose
 from mission.behaviours import behaviour as registry
 from mission.behaviours.behaviour import Behaviour, NoParameters
-from mission.executive import executive as module
+from mission.executive import conductor as module
+from mission.executive import executive as face
 from mission.executive import resume
 from mission.executive.clock import Clock, LockstepClock, LockstepLoop, WallClock
 from mission.executive.executive import Executive, Outcome
@@ -247,7 +248,7 @@ OUTCOMES = ("done", "found", "failed")
 def fly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Flight]:
     """`fly(states, {"behaviour": coroutine}, …)` prepares a flight; `.run()` flies it."""
     known: dict[str, Behaviour] = {}
-    for place in (registry, module, resume):
+    for place in (registry, module, face, resume):
         monkeypatch.setattr(place, "behaviours", lambda: known)
 
     def prepare(

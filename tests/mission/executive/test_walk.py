@@ -11,7 +11,8 @@ import pytest
 
 from mission.behaviours import behaviour as registry
 from mission.behaviours.behaviour import behaviours
-from mission.executive import executive as module
+from mission.executive import conductor as module
+from mission.executive import executive as face
 from mission.executive import resume
 from mission.executive.events import EVENTS, Severity, fallbacks, outcomes
 from mission.executive.machine import Machine
@@ -89,7 +90,7 @@ def idle(monkeypatch: pytest.MonkeyPatch) -> None:
         return ""
 
     known = {name: replace(entry, run=wait) for name, entry in behaviours().items()}
-    for place in (registry, module, resume):
+    for place in (registry, module, face, resume):
         monkeypatch.setattr(place, "behaviours", lambda: known)
 
 
