@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 WORKING_PX = 800  # pictures wider than this are halved
 MODEL_HUB_PX = 1.0  # what equal straight edges leave out: foreshortening, twist, bend
 MODEL_DIRECTION = np.deg2rad(0.4)
-LEAST_SUPPORT = 0.5
+LEAST_SUPPORT = 0.5  # of the better edge of each blade
+LEAST_SEEN, LEAST_AGREEMENT = 0.72, 0.55  # of all edges, after and before the last fraction of a pixel
 MOST_FITS = 4
 EQUAL_MERIT = 0.95
 CLEAR_AGREEMENT = 0.95  # share of the six edges' length at which no wider search is needed
@@ -125,8 +126,9 @@ def _doubts(fit: Fit, camera: Camera) -> list[str]:
     best = (fit.support * np.minimum(fit.samples / 12, 1)).max(axis=1)
     if best.min() < LEAST_SUPPORT:
         reasons.append(f"only {int((best >= LEAST_SUPPORT).sum())} of three blades have an edge where it should be")
-    elif fit.support.mean() < LEAST_SUPPORT:
-        reasons.append(f"the blades' edges are seen over {fit.support.mean():.0%} of their length only")
+    seen = float((fit.support * fit.samples).sum() / max(fit.samples.sum(), 1.0))
+    if not reasons and (seen < LEAST_SEEN or fit.agreement < LEAST_AGREEMENT):
+        reasons.append(f"only {min(seen, fit.agreement):.0%} of the blades' edges are where they should be")
     gaps = np.diff(np.sort(fit.directions), append=np.sort(fit.directions)[0] + 2 * np.pi)
     if np.abs(np.degrees(gaps) - 120).max() > 12:
         reasons.append("the blades are not 120° apart")

@@ -19,6 +19,7 @@ Array = NDArray[Any]  # of floats
 LANES = 25  # across the blade, from edge to edge
 STEP = 1.5  # px along a lane
 LANE_DOTS = 12.0  # px to each side of a lane within which dots show that the blade goes on
+CLOSING = 0.95  # of the blade's width: how far past the ends of its edges a tip may close
 BEYOND_MISSING = 8.0  # px: a rounded tip may reach a little past the first missing dot beside it
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 BOX, LONG_BOX = 5, 18  # samples averaged on either side of a step, and on either side to tell it from a streak
@@ -119,9 +120,9 @@ def _closed_end(
             outline = _outline(lanes, where, found, toward, across, last_dot, border, wide)
         if outline is not None:
             outline = replace(outline, step=float(np.median(size[found])))
-    if bracket is None:
-        return outline
     reach = float(outline.point @ toward) if outline is not None else np.inf
+    if bracket is None:
+        return outline if reach < max(last for last, _ in ends) + CLOSING * wide else None
     within = bracket[1] + (
         BEYOND_MISSING if outline is None or outline.step < clear else max(BEYOND_MISSING, 0.4 * wide)
     )
