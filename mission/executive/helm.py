@@ -39,12 +39,13 @@ class Helm:
             stroke()
 
     async def patiently(self, awaitable: Awaitable[Any]) -> None:
-        """Wait without appearing dead."""
+        """Wait without appearing dead. What the gate has stopped is over, and no error."""
         task = asyncio.ensure_future(awaitable)
         while not task.done():
             self.beat()
             await asyncio.wait([task], timeout=PULSE_S)
-        task.result()
+        if not task.cancelled():
+            task.result()
 
     def hold(self) -> None:
         """Stay here, if setpoints are being sent at all."""

@@ -187,6 +187,18 @@ def test_a_pilot_who_flies_meanwhile_keeps_the_vehicle(fly: Any) -> None:
     assert after.services.setpoints.target is None and after.autopilot.commands == []
 
 
+def test_a_pilot_who_takes_over_while_it_is_taken_up_gets_it(fly: Any) -> None:
+    before = killed_at(fly, 3.2)
+    after = resumed(fly, before, before.path)
+
+    async def start(first: Any) -> None:
+        after.executive.raise_event("pilot_took_over")
+
+    after.services.setpoints.start = start
+    assert after.run().outcome == "released"
+    assert after.autopilot.commands == []
+
+
 def test_what_cannot_be_gone_on_with_is_refused_in_one_line(fly: Any, tmp_path: Path) -> None:
     ended = fly(INSPECTION, PASSES, name="ended.jsonl")
     ended.run()
