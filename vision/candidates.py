@@ -16,6 +16,7 @@ from vision.surface import Surface
 Array = NDArray[Any]  # of floats
 
 CANDIDATES = 30
+LAST_SAMPLES = 84  # profiles along a line when it is measured for good
 LEAST_SUPPORT = 0.5
 INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
@@ -103,13 +104,13 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     normal, rho = normal[keep][:CANDIDATES], rho[keep][:CANDIDATES]
     if len(rho) == 0:
         return []
-    for reach, slopes, samples in ((8, 2.4, 48), (4, 0.6, 96)):
+    for reach, slopes, samples in ((8, 2.4, 40), (4, 0.6, LAST_SAMPLES)):
         low, high = _beside(dots, normal)
         profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, low, high), reach, slopes, samples)
         normal, rho = profile.normal, profile.rho
         low, high = _beside(dots, normal)
         beside, support = _support(profile, low, high)
-        if samples < 96:
+        if samples < LAST_SAMPLES:
             promising = np.flatnonzero(
                 (support > 0.6 * LEAST_SUPPORT) & ((dots @ normal.T - rho > 5).mean(axis=0) < 0.2)
             )
@@ -142,7 +143,7 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
             + (0.2 if np.isnan(told) else 0.6 * told if told > 0.5 else -7.0 * (0.5 - told))
             - 2.0 * blocked[k]
             - 3.0 * max(blocked[k] - 0.5, 0.0)
-            - (4.0 if blade.grid_known else 2.5) * empty
+            - (5.0 if blade.grid_known else 2.5) * empty
             - 5.0 * crossed[k]
             + 0.15 * min(beyond, 6)
         )
@@ -255,8 +256,9 @@ def _parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noi
     """
     stereo, surface = other.stereo, other.surface
     height, width = other.smooth.shape[:2]
-    lines, places = profile.t.shape
-    points = (profile.normal * profile.rho[:, None])[:, None] + profile.t[..., None] * profile.direction[:, None]
+    t, agrees, step = (values[:, ::2] for values in (profile.t, profile.agrees & beside, profile.step))
+    lines, places = t.shape
+    points = (profile.normal * profile.rho[:, None])[:, None] + t[..., None] * profile.direction[:, None]
     rays = stereo.left.rays((points + stereo.left.centre).reshape(-1, 2))
     inverse = np.clip((1 - rays[:, 1:] @ surface.slope) / surface.depth_m, 0.02, 1.5)
 
@@ -280,8 +282,8 @@ def _parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noi
     middle = PARALLAX_SAMPLES // 2
     seen = (u[..., middle] > 4) & (v[..., middle] > 4)
     seen &= (u[..., middle] < width - 5) & (v[..., middle] < height - 5)
-    seen &= profile.agrees & beside
+    seen &= agrees
     like = np.abs(gradient)
-    strong = like.max(axis=2) > np.maximum(0.4 * np.abs(profile.step), 1.2 * noise)
+    strong = like.max(axis=2) > np.maximum(0.4 * np.abs(step), 1.2 * noise)
     share = (strong & seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
-    return np.asarray(np.where(telling & (seen.sum(axis=1) >= 8), share, np.nan), float)
+    return np.asarray(np.where(telling & (seen.sum(axis=1) >= 5), share, np.nan), float)
