@@ -18,11 +18,17 @@ if TYPE_CHECKING:
 class SurveyTurbine(Parameters):
     """Parameters of `survey_turbine`."""
 
-    distance_m: float = Field(64.0, ge=30, le=80, description="of the two far viewpoints, in front of the hub")
+    distance_m: float = Field(
+        64.0, ge=30, le=80, description="of the two far viewpoints, from the hub of a rotor of 40 m radius"
+    )
     baseline_m: float = Field(24.0, ge=6, le=60, description="between these, to the side")
     near_m: float = Field(36.0, ge=30, le=60, description="distance of a third; it tells the compass's error apart")
     pictures: int = Field(4, ge=1, le=20, description="pictures at each viewpoint")
     speed_m_s: float = Field(6.0, gt=0, le=10, description="speed between the viewpoints")
+
+
+USUAL_RADIUS_M = 40.0
+SMALLEST = 0.45  # a small rotor is looked at from nearer, but never from beside it
 
 
 @behaviour(
@@ -77,8 +83,9 @@ def _viewpoints(services: Services, parameters: SurveyTurbine) -> list[np.ndarra
     """Places (3,) in local NED: two far ones on either side of the axis, then a near one on it."""
     turbine = services.turbine
     x, y, _ = turbine.axes()
-    front = turbine.hub - parameters.distance_m * x
-    far = [front + side * parameters.baseline_m / 2 * y for side in (-1.0, 1.0)]
+    scale = min(1.0, max(SMALLEST, turbine.tip_radius_m / USUAL_RADIUS_M))
+    front = turbine.hub - scale * parameters.distance_m * x
+    far = [front + side * scale * parameters.baseline_m / 2 * y for side in (-1.0, 1.0)]
     here = services.autopilot.telemetry.pose.position
     far.sort(key=lambda place: float(np.linalg.norm(place - here)))
-    return [*far, turbine.hub - parameters.near_m * x]
+    return [*far, turbine.hub - scale * parameters.near_m * x]

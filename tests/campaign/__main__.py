@@ -12,7 +12,7 @@ from pathlib import Path
 from tests.campaign.flights import FLIGHTS, Flight, shortfalls
 
 ROOT = Path(__file__).parents[2]
-ROW = "{:<22}{:<11}{:>5}{:>6}{:>7}{:>7}{:>8}{:>7}{:>7}  {}"
+ROW = "{:<22}{:<11}{:>5}{:>8}{:>8}{:>8}{:>9}{:>8}{:>8}  {}"
 
 
 def fly(flight: Flight, mission: str, record: Path, extra: list[str]) -> tuple[int, dict[str, object], float]:
