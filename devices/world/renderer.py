@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,6 +46,15 @@ class Renderer:
         self._seen = np.empty((0, 0), np.int32)
         self._sensors: dict[tuple[int, int], Sensor] = {}
         self._lenses: dict[Camera, Distortion] = {}
+
+    @cached_property
+    def second(self) -> Renderer:
+        """Another renderer of the same world with buffers of its own, for a second thread."""
+        twin = copy(self)
+        twin._points = np.empty_like(self.mesh.vertices)
+        twin._buffers = {}
+        twin._seen = np.empty((0, 0), np.int32)
+        return twin
 
     def visibility(
         self, camera: Camera, pose: CameraPose, factor: int = 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 from devices.world.laser import spots_on
 from devices.world.lens import right_pose
 from devices.world.motion import moved, smeared
@@ -9,8 +11,10 @@ from devices.world.renderer import Renderer
 from devices.world.settings import WorldSettings
 from devices.world.true_view import TrueView, true_view
 from devices.world.turbine import TurbineShape
-from vision.camera import RigGeometry
+from vision.camera import Camera, RigGeometry
 from vision.capture import CameraPose, Image, StereoFrames
+
+_SECOND_EYE = ThreadPoolExecutor(1, "second eye")
 
 
 def draw(
@@ -29,22 +33,27 @@ def draw(
     lit: whether the laser shines in its images; a broken one does not. frame: number of the cycle, which chooses the
     noise. shift: by how many pixels the scene moves between the laser-off and the laser-on exposure; the spots move
     with the camera and stay where they are."""
-    images: list[Image | None] = []
     both = laser and geometry.laser is not None
     spots = spots_on(renderer.mesh, geometry, pose) if both and lit else None
     blur = renderer.settings.camera.motion_blur
-    for eye, camera in enumerate((geometry.stereo.left, geometry.stereo.right)):
-        place = pose if eye == 0 else right_pose(geometry, pose)
+
+    def look(eye: int, hand: Renderer, camera: Camera, place: CameraPose) -> tuple[Image, Image | None]:
         sensor = renderer.sensor(camera)
-        off = smeared(sensor.darkened(renderer.scenery(camera, place)), (shift[0] * blur, shift[1] * blur))
+        off = smeared(sensor.darkened(hand.scenery(camera, place)), (shift[0] * blur, shift[1] * blur))
         on = None
         if both:
             on = moved(off, shift)
             if spots is not None:
-                renderer.add_laser(on, spots, camera, place, shift)
+                hand.add_laser(on, spots, camera, place, shift)
             on = sensor.exposed(on, 4 * frame + 2 + eye)
-        images += [sensor.exposed(off, 4 * frame + eye), on]
-    return StereoFrames(stamp_s, images[0], images[2], images[1], images[3])
+        return sensor.exposed(off, 4 * frame + eye), on
+
+    stereo = geometry.stereo
+    renderer.sensor(stereo.left), renderer.sensor(stereo.right)
+    other = _SECOND_EYE.submit(look, 1, renderer.second, stereo.right, right_pose(geometry, pose))
+    left, left_laser = look(0, renderer, stereo.left, pose)
+    right, right_laser = other.result()
+    return StereoFrames(stamp_s, left, right, left_laser, right_laser)
 
 
 def render_view(

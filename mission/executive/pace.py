@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from mission.executive.clock import WallClock
 
-CYCLE_S = 0.30  # mission seconds that a cycle of vision may take on the average before time is slowed down
+CYCLE_S = 0.35  # mission seconds that a cycle of vision may take on the average before time is slowed down
 SLOWEST = 1.0
 EASE = 1.1  # faster again by at most this factor a cycle
 STEP = 0.1  # smaller changes of the speed are not worth making
