@@ -26,6 +26,7 @@ class ApproachRoot(Parameters):
     creep_m_s: float = Field(0.6, gt=0, le=1.5, description="speed from there on")
 
 
+FRESH_S = 1.0  # an older estimate does not lead any nearer
 SEEN_S = 1.0  # the blade must have been tracked without a break for so long before the approach relies on it
 
 
@@ -58,7 +59,7 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
         elapsed, last = now - last, now
         estimate = services.perception.estimate()
         telemetry = services.autopilot.telemetry
-        fresh = estimate is not None and estimate.age_s < 0.7 and estimate.distance_sigma_m < 0.3
+        fresh = estimate is not None and estimate.age_s < FRESH_S and estimate.distance_sigma_m < 0.3
         seen_since = (seen_since if seen_since is not None else now) if fresh else None
         services.autopilot.point_gimbal(yaw, 0.0)
         if estimate is not None and services.setpoints.keep_out is not None:
@@ -69,7 +70,7 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
             services.progress.station_m = estimate.station_m
             goal = telemetry.pose.position + ahead * excess
             goal = goal + _centring(root, goal, ahead)
-            carrot = approach(carrot, goal, parameters.creep_m_s * elapsed)
+            carrot = _no_further(approach(carrot, goal, parameters.creep_m_s * elapsed), goal, ahead)
             if abs(excess) < 0.25 and np.linalg.norm(telemetry.pose.velocity) < 0.3:
                 return "arrived"
         else:
@@ -77,6 +78,8 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
             room = np.inf if telemetry.range_m is None else telemetry.range_m - (parameters.standoff_m + 0.5)
             if room > 0:
                 carrot = approach(carrot, nearest, parameters.creep_m_s * elapsed)
+            else:
+                carrot = _no_further(carrot, telemetry.pose.position + ahead * room, ahead)
             if np.linalg.norm(carrot - nearest) < 0.05 and np.linalg.norm(telemetry.pose.velocity) < 0.2:
                 return "not_found"
         services.setpoints.target = Setpoint(carrot.copy(), yaw)
@@ -87,6 +90,12 @@ def _excess(estimate: BladeEstimate, range_m: float | None, standoff_m: float) -
     """How much too far away the vehicle is, by whatever is nearest."""
     nearest = estimate.nearest_m if range_m is None else min(estimate.nearest_m, range_m + 0.15)
     return nearest - standoff_m
+
+
+def _no_further(carrot: np.ndarray, goal: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """The carrot (3,), but not nearer to the blade than the goal."""
+    result: np.ndarray = carrot - max(0.0, float((carrot - goal) @ ahead)) * ahead
+    return result
 
 
 def _centring(root: np.ndarray, goal: np.ndarray, ahead: np.ndarray) -> np.ndarray:
