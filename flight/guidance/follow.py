@@ -57,7 +57,7 @@ class FollowSettings:
     speed_m_s: float = 0.8
     k: float = 0.25
     position_gain: float = 0.95
-    edge_bridge_s: float = 3.0
+    edge_bridge_s: float = 6.0
     acceleration_m_s2: float = 0.4
     aim_limit: float = np.deg2rad(8.0)
     yaw_limit: float = np.deg2rad(25.0)

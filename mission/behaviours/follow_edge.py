@@ -25,7 +25,7 @@ class FollowEdge(Parameters):
     record: bool = Field(True, description="whether frames are kept for the inspector")
 
 
-EDGE_PATIENCE_S = 4.0  # the wanted edge unseen for so long, though the blade is seen
+EDGE_PATIENCE_S = 8.0  # the wanted edge unseen for so long, though the blade is seen
 TIP_WINDOW_S = 2.0
 TIP_WITHIN_M = 4.0  # of where the turbine file has it: what looks like a tip elsewhere is dirt or another blade
 PAST_TIP_M = 1.5  # beyond the expected tip nothing is followed

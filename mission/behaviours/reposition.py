@@ -19,6 +19,9 @@ class Reposition(Parameters):
     standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to hold meanwhile")
     steady_s: float = Field(1.0, gt=0, le=10, description="how long the new edge must be held in view")
 
+BRIDGE_S = 6.0  # an edge before a tower comes and goes: so long it may be carried by the tracker,
+SURE_M = 0.15  # while it is known as well as this
+
 
 @behaviour(
     outcomes={"in_position": "the other edge is in view and tracked"},
@@ -37,7 +40,7 @@ async def reposition(services: Services, parameters: Reposition) -> str:
             continue
         estimate, _ = steered
         side = following.side(estimate)
-        seen = side is not None and side.age_s < 0.6
+        seen = side is not None and (side.age_s < 0.6 or (side.age_s < BRIDGE_S and side.offset_sigma_m < SURE_M))
         services.progress.text = f"{parameters.side} edge {'in view' if seen else 'not in view yet'}"
         good_since = (good_since if good_since is not None else now) if seen else None
         if good_since is not None and now - good_since >= parameters.steady_s:
