@@ -96,6 +96,11 @@ class ParameterTable:
         self._values[name] = round(value) if isinstance(self._values[name], int) else float(value)
         return True
 
+    def stretch_times(self, factor: float) -> None:
+        """Multiply the time-outs, as when simulated time changes its speed: on the wall's clock they stay as they are."""
+        for name in _SCALED_WITH_TIME:
+            self.set(name, self._values[name] * factor)
+
     def is_whole(self, name: str) -> bool:
         """Whether it is an INT32."""
         return isinstance(self._values[name], int)

@@ -68,7 +68,8 @@ class VehicleServer:
         }
 
     def change_speed(self, speed: float) -> None:
-        """Go on from now at another speed; the autopilot's time-outs stay as they were multiplied at the start."""
+        """Go on from now at another speed; the autopilot's time-outs last as long on the wall's clock as before."""
+        self.vehicle.firmware.parameters.stretch_times(speed / self._speed)
         self._speed = speed
         self._origin_s = time.monotonic() - self.vehicle.time_s / speed
 
