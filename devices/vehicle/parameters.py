@@ -97,7 +97,7 @@ class ParameterTable:
         return True
 
     def stretch_times(self, factor: float) -> None:
-        """Multiply the time-outs, as when simulated time changes its speed: on the wall's clock they stay as they are."""
+        """Multiply the time-outs, as when simulated time changes speed: on the wall clock they stay."""
         for name in _SCALED_WITH_TIME:
             self.set(name, self._values[name] * factor)
 
