@@ -71,9 +71,12 @@ class KeepOut:
 
         It is allowed, reached straight from `current` without entering the volume, and as near to `position` as sliding
         along the volume's surface brings it. A vehicle inside is never held there: it may go anywhere that does not
-        lead deeper, and is otherwise sent out the shortest way, or to the front.
+        lead deeper, and is otherwise sent out the shortest way, or to the front. Where either point is not finite, it
+        is `current`: stay. If that is the one, nobody knows what lies on the way, and no other answer is safe.
         """
         position, current = np.asarray(position, float), np.asarray(current, float)
+        if not (np.isfinite(position).all() and np.isfinite(current).all()):
+            return current, True
         depth = min(0.0, self.distance(current))
 
         def reachable(point: Array) -> bool:

@@ -7,6 +7,8 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flight.autopilot import Setpoint
 from mission.executive.gate import Gate
 
@@ -25,6 +27,7 @@ class Helm:
         """services: before they are put behind the gate."""
         self._autopilot, self._setpoints, self._perception = services.autopilot, services.setpoints, services.perception
         self._log, self._gate, self._stalled = services.log, gate, stalled
+        self._commanded = services.commanded
         self._beaten_s: float | None = None
 
     def beat(self) -> None:
@@ -48,10 +51,12 @@ class Helm:
             task.result()
 
     def hold(self) -> None:
-        """Stay here, if setpoints are being sent at all."""
+        """Stay here, if setpoints are being sent at all; where the vehicle is not known to be, at the last target."""
         if self._gate.let_go or self._setpoints.target is None:
             return
         pose = self._autopilot.telemetry.pose
+        if not (np.isfinite(pose.position).all() and np.isfinite(pose.attitude[2])):
+            return
         self._setpoints.target = Setpoint(pose.position.copy(), float(pose.attitude[2]))
 
     def let_go(self) -> None:
@@ -68,7 +73,8 @@ class Helm:
         """At the end: a vehicle that is still in the air, and ours, is left in the autopilot's own hold."""
         if self._gate.let_go:
             return
+        ours = self._commanded.took_over or self._setpoints.target is not None
         with suppress(Exception):
-            if self._autopilot.telemetry.in_air:
+            if ours and self._autopilot.telemetry.in_air:
                 await self.patiently(asyncio.wait_for(self._autopilot.hold(), _LAST_HOLD_S))
         self._setpoints.stop()

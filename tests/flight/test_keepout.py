@@ -220,3 +220,12 @@ class TestMeasuredSurface:
             for _ in range(35):
                 volume = volume.with_blade_surface(blade.estimate(0.0, vehicle.camera()), 0.1)
             assert volume.distance(vehicle.position) > 0.25
+
+
+@pytest.mark.parametrize("unknown", ["vehicle", "target"])
+def test_where_a_point_is_not_known_the_answer_is_to_stay(unknown):
+    inside, nowhere, here = SURE.hub, np.array([np.nan, 0.0, -70.0]), np.array([20.0, 10.0, -70.0])
+    current, wanted = (nowhere, inside) if unknown == "vehicle" else (here, nowhere)
+    answer, bounded = VOLUME.bound(wanted, current)
+    assert bounded
+    np.testing.assert_array_equal(answer, current)

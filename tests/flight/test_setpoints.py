@@ -174,3 +174,80 @@ def test_every_setpoint_is_bounded_from_the_first_on_and_each_encounter_told_onc
         assert not any(keep_out.inside(setpoint.position) for setpoint in [*rig.autopilot.started, *rig.autopilot.sent])
 
     run(story)
+
+
+def test_an_unexpected_error_of_one_setpoint_is_told_once_and_the_next_are_sent():
+    async def story() -> None:
+        errors: list[Exception] = []
+        rig = Rig(on_error=errors.append)
+        await rig.stream.start(FIRST)
+        send, rig.autopilot.send = rig.autopilot.send, lambda setpoint: setpoint.nothing
+        await rig.live(0.5)
+        assert rig.events == ["setpoints_stalled"]
+        assert [type(error) for error in errors] == [AttributeError]
+        assert rig.stream.statistics.failed >= 10
+        assert not rig.stream.streaming
+        rig.autopilot.send = send
+        count = len(rig.autopilot.sent)
+        await rig.live(0.5)
+        assert len(rig.autopilot.sent) >= count + 10
+        assert rig.stream.streaming
+        assert rig.events == ["setpoints_stalled"]
+
+    run(story)
+
+
+def test_a_link_that_refuses_setpoints_for_long_is_told_too():
+    async def story() -> None:
+        rig = Rig()
+        await rig.stream.start(FIRST)
+        rig.autopilot.refuses = True
+        await rig.live(2.0)
+        assert rig.events == ["setpoints_stalled"]
+
+    run(story)
+
+
+@pytest.mark.parametrize(
+    "wrong", [Setpoint(np.array([np.nan, 0.0, -20.0]), 0.1), Setpoint(np.array([1.0, 0.0, -20.0]), np.inf)]
+)
+def test_a_target_that_is_not_finite_keeps_the_last_setpoint_and_is_told_once(wrong):
+    async def story() -> None:
+        keep_out = KeepOut(Turbine(np.array([60.0, 0.0, -78.0]), 0.0, 0.5, hub_sigma_m=0.5))
+        rig = Rig(keep_out)
+        rig.autopilot.move_to(np.array([0.0, 0.0, -20.0]))
+        await rig.stream.start(FIRST)
+        rig.stream.target = wrong
+        await rig.live(0.5)
+        assert rig.events == ["behaviour_failed"]
+        assert rig.stream.statistics.unusable >= 10
+        assert len(rig.autopilot.sent) >= 10
+        assert all(setpoint is FIRST for setpoint in rig.autopilot.sent)
+
+    run(story)
+
+
+def test_while_the_position_is_unknown_no_target_is_followed_past_the_keep_out_volume():
+    async def story() -> None:
+        keep_out = KeepOut(Turbine(np.array([60.0, 0.0, -78.0]), 0.0, 0.5, hub_sigma_m=0.5))
+        rig = Rig(keep_out)
+        rig.autopilot.move_to(np.array([0.0, 0.0, -20.0]))
+        await rig.stream.start(FIRST)
+        rig.autopilot.move_to(np.full(3, np.nan))
+        rig.stream.target = Setpoint(np.array([60.0, 10.0, -70.0]), 0.0)
+        await rig.live(0.5)
+        assert len(rig.autopilot.sent) >= 10
+        assert all(setpoint is FIRST for setpoint in rig.autopilot.sent)
+
+    run(story)
+
+
+def test_nothing_is_begun_from_an_unknown_position_beside_the_keep_out_volume():
+    async def story() -> None:
+        rig = Rig(KeepOut(Turbine(np.array([60.0, 0.0, -78.0]), 0.0, 0.5, hub_sigma_m=0.5)))
+        rig.autopilot.move_to(np.full(3, np.nan))
+        with pytest.raises(AutopilotError, match="not known"):
+            await rig.stream.start(FIRST)
+        assert rig.autopilot.started == [] and rig.stream.target is None
+
+    run(story)
