@@ -115,6 +115,12 @@ class LockstepAutopilot:
         table = self.vehicle.firmware.parameters
         return {name: float(table[name]) for name in names if name in table}
 
+    async def set_parameter(self, name: str, value: float) -> None:
+        """Change a parameter."""
+        await self._answer()
+        if not self.vehicle.firmware.parameters.set(name, value):
+            raise AutopilotError(f"parameter {name}: the autopilot does not take {value:g}")
+
     async def arm(self) -> None:
         await self._command("arm", self.vehicle.firmware.arm)
 

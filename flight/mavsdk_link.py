@@ -120,6 +120,36 @@ class MavsdkAutopilot:
                         break
         return values
 
+    async def set_parameter(self, name: str, value: float) -> None:
+        """Change a parameter, of whichever type it is, and read it back."""
+        from mavsdk.asyncio.plugins.param import ParamAsync
+        from mavsdk.plugins.param import ParamError, ParamResult
+
+        plugin = ParamAsync(self._channel.system)
+        try:
+            try:
+                await self._channel.blocking(plugin.get_param_int(name))
+                await self._channel.blocking(plugin.set_param_int(name, round(value)))
+            except ParamError as error:
+                if error.result is not ParamResult.WRONG_TYPE:
+                    raise
+                await self._channel.blocking(plugin.set_param_float(name, float(value)))
+        except ParamError as error:
+            answer = error.result.name.lower().replace("_", " ")
+            raise AutopilotError(f"parameter {name} could not be set to {value:g}: {answer}") from None
+        held = (await self.parameters([name])).get(name)
+        if held is None or abs(held - value) > 1e-4 * max(1.0, abs(value)):
+            raise AutopilotError(f"parameter {name} was set to {value:g} and is {held}: the autopilot refuses it")
+
+    async def measured_speed(self, wall_s: float = 1.0) -> float | None:
+        """The vehicle's seconds per wall second, by the stamps of its messages; None where they tell nothing."""
+        before = self._intake.last_boot
+        await asyncio.sleep(wall_s)
+        after = self._intake.last_boot
+        if before is None or after is None or after[1] - before[1] < 0.5 * wall_s or after[0] < before[0]:
+            return None
+        return (after[0] - before[0]) / (after[1] - before[1])
+
     async def arm(self) -> None:
         """Arm. PX4 refuses it in a mode that it was left in by a landing; then it is put on hold first."""
         telemetry = self.telemetry

@@ -48,6 +48,7 @@ class TelemetryIntake:
         self._stamps: dict[int, StampMap] = {}
         self._last_wall_s = -inf
         self._range: tuple[float, float | None] = (-inf, None)
+        self.last_boot: tuple[float, float] | None = None  # the autopilot's clock, and when it said so by the wall's
         self.poses = PoseHistory()
         self.process_gimbal: ProcessGimbal | None = None
         self.gimbal_heard = False
@@ -117,6 +118,8 @@ class TelemetryIntake:
 
     def _stamp(self, fields: Fields, arrival: Arrival) -> float:
         """On the executive's clock. Each component has a clock of its own."""
+        if arrival.component == AUTOPILOT:
+            self.last_boot = fields["time_boot_ms"] / 1e3, arrival.wall_s
         stamps = self._stamps.setdefault(arrival.component, StampMap())
         stamp, restarted = stamps.map(fields["time_boot_ms"] / 1e3, arrival.clock_s, arrival.wall_s)
         if restarted and arrival.component == AUTOPILOT:

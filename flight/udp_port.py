@@ -5,12 +5,26 @@ from __future__ import annotations
 import errno
 import re
 import socket
+from pathlib import Path
 
 from flight.autopilot import AutopilotError
 
 
 def check_address(system_address: str) -> None:
-    """Raise AutopilotError, in one line, where the address is malformed or its port is taken."""
+    """Raise AutopilotError, in one line, where the address is malformed, its port taken or its serial line absent."""
+    kind, host, port = check_form(system_address)
+    if kind == "udpin":
+        _check_free(host, port)
+    elif kind.startswith("serial") and not Path(host).exists():
+        raise AutopilotError(f"{system_address}: there is no {host}: is the autopilot plugged in? (ls /dev/tty* tells)")
+
+
+def check_form(system_address: str) -> tuple[str, str, int]:
+    """Kind, host and port of an address; device and baud rate (0: the usual one) of a serial one.
+
+    Raises:
+        AutopilotError: malformed; one line.
+    """
     match = re.fullmatch(r"(udpin|udpout|tcpin|tcpout|serial|serial_flowcontrol)://(.+)", system_address)
     if match is None:
         raise AutopilotError(
@@ -19,12 +33,12 @@ def check_address(system_address: str) -> None:
         )
     kind, rest = match.groups()
     if kind.startswith("serial"):
-        return
+        device, _, baud = rest.partition(":")
+        return kind, device, int(baud) if baud.isdecimal() else 0
     host, colon, port = rest.rpartition(":")
     if not colon or not port.isdecimal() or not 0 < int(port) < 65536:
         raise AutopilotError(f"{system_address!r} lacks a port: write {kind}://HOST:PORT with a port from 1 to 65535")
-    if kind == "udpin":
-        _check_free(host, int(port))
+    return kind, host, int(port)
 
 
 def _check_free(host: str, port: int) -> None:

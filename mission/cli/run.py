@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from mission.record.folder import RunFolder
 
 
+FRAMING = ("follow_edge", "climb_tower")
+"""Behaviours that leave pictures in the record."""
+
+
 class Autonomy(StrEnum):
     """How much is asked before a transition is taken."""
 
@@ -78,11 +82,12 @@ def run(
         from mission.executive.resume import interrupted
 
         interrupted(resumed.journal, mission)  # refuse what cannot be gone on with before a folder is made
-    _may_fly(mission, speed=speed, lockstep=lockstep, system=system, yes=yes)
+    must_confirm = _may_fly(mission, speed=speed, lockstep=lockstep, system=system, yes=yes)
 
-    from mission.record.folder import create
+    from mission.record.folder import NEEDED_MB, NEEDED_WITHOUT_FRAMES_MB, create
 
-    folder = create(record, mission.name, mission.resolved_yaml)
+    needed_mb = NEEDED_MB if _takes_frames(mission) else NEEDED_WITHOUT_FRAMES_MB
+    folder = create(record, mission.name, mission.resolved_yaml, needed_mb)
     result, view = _fly(
         mission,
         folder,
@@ -92,6 +97,7 @@ def run(
             "speed": speed,
             "lockstep": lockstep,
             "system": system,
+            "must_confirm": must_confirm,
             "autonomy": str(autonomy),
             "resume": resumed.path if resumed else None,
         },
@@ -117,26 +123,43 @@ def _mission(file: Path | None, resumed: RunFolder | None, overrides: list[str],
     return load(file if file is not None else resumed.mission, overrides, rig)  # type: ignore[union-attr]
 
 
-def _may_fly(mission: Mission, *, speed: float | None, lockstep: bool, system: str | None, yes: bool) -> None:
-    """Refuse at once what could only fail later."""
-    if lockstep and (speed is not None or system is not None or mission.rig.kind != "simulated"):
-        raise CommandError("run: --lockstep is for the embedded simulator alone: leave out --speed, --system and --rig")
-    if not must_ask(mission, system):
-        return
-    if speed not in (None, 1.0):
+def _may_fly(mission: Mission, *, speed: float | None, lockstep: bool, system: str | None, yes: bool) -> bool:
+    """Refuse at once what could only fail later; return whether a person must say yes before arming."""
+    from mission.executive.connection import EMBEDDED, is_simulated, must_confirm
+
+    if lockstep:
+        _may_lockstep(mission, speed, system)
+    if system is not None and system != EMBEDDED:
+        _well_formed(system)
+    where = EMBEDDED if lockstep else system
+    if speed not in (None, 1.0) and not is_simulated(mission.rig, where):
         raise CommandError(f"run: --speed {speed:g}: a real vehicle flies at speed 1")
-    if not yes and not _interactive():
+    asks = must_confirm(mission.rig, where)
+    if asks and not yes and not _interactive():
         raise CommandError("run: a real vehicle is armed only after a yes: answer in a terminal, or give --yes")
+    return asks
 
 
-def must_ask(mission: Mission, system: str | None) -> bool:
-    """Whether a person must say yes before the vehicle is armed: always, unless it is known to be simulated."""
-    asked: bool | None = mission.rig.confirm_arming
-    if asked is not None:
-        return asked
-    if system is not None and system != "embedded":
-        return mission.rig.kind not in ("px4_sitl", "simulated")
-    return mission.rig.kind == "hardware"
+def _takes_frames(mission: Mission) -> bool:
+    return any(state.do in FRAMING for state in mission.states.values())
+
+
+def _may_lockstep(mission: Mission, speed: float | None, system: str | None) -> None:
+    if mission.rig.kind != "simulated":
+        raise CommandError(f"run: --lockstep needs a rig of kind simulated, and this one is {mission.rig.kind}")
+    for flag, given in (("--speed", speed), ("--system", system)):
+        if given is not None:
+            raise CommandError(f"run: --lockstep is for the embedded simulator, as fast as it goes: leave out {flag}")
+
+
+def _well_formed(system: str) -> None:
+    from flight.autopilot import AutopilotError
+    from flight.udp_port import check_form
+
+    try:
+        check_form(system)
+    except AutopilotError as error:
+        raise CommandError(f"run: --system: {error}") from None
 
 
 def _interactive() -> bool:

@@ -44,6 +44,10 @@ def simulate(
         float | None, typer.Option(min=-360, max=360, metavar="DEG", help="Where the wind comes from.")
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Another wind, noise and drift.")] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option("--param", metavar="NAME=VALUE", help="Another value of an autopilot parameter; repeat it."),
+    ] = None,
     record: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write truth.csv and vehicle_events.jsonl there.")
     ] = None,
@@ -58,13 +62,15 @@ def simulate(
       mission simulate --speed 4
       mission simulate --wind 8 --gust 12 --wind-from 200
       mission simulate --mission missions/v80_blade.yaml
-      mission run missions/v80_blade.yaml --system udpin://0.0.0.0:14540    in another terminal
+      mission simulate --param COM_OBL_RC_ACT=0 --param COM_OF_LOSS_T=5     as PX4 SITL starts
+      mission run missions/v80_blade.yaml --system udpin://0.0.0.0:14540    in another terminal, with the same --speed
       mavproxy.py --master=udpin:127.0.0.1:14550                            or fly it by hand
     """
     from devices.vehicle.settings import LinkSettings, ProcessSettings, VehicleSettings
 
     if changes and mission is None:
         raise CommandError("simulate: --set changes a mission's world: name it with --mission FILE")
+    changed = _parameters(parameters or [])
     world, surroundings = _world(mission, changes or [])
     breeze = world.wind
     breeze = breeze.model_copy(
@@ -79,7 +85,7 @@ def simulate(
         links.append(LinkSettings(role="gcs", local_port=STATION_LISTENS if listen else 0, remote_port=station_port))
     _serve(
         ProcessSettings(
-            vehicle=VehicleSettings.of_world(world.model_copy(update={"wind": breeze})),
+            vehicle=VehicleSettings.of_world(world.model_copy(update={"wind": breeze}), parameters=changed),
             seed=world.seed if seed is None else seed,
             speed=speed,
             links=tuple(links),
@@ -102,6 +108,27 @@ def _world(mission: Path | None, changes: list[str]) -> tuple[WorldSettings, Sur
     world = document.world or WorldSettings()
     around = Surroundings(turbine=document.turbine.model_dump(), site=document.site.model_dump(), settings=world)
     return world, around
+
+
+def _parameters(changes: list[str]) -> dict[str, float]:
+    """Values by name; one line where a name is not the simulated autopilot's or a value is no number."""
+    from math import isfinite
+
+    from devices.vehicle.parameters import DEFAULTS
+
+    values: dict[str, float] = {}
+    for change in changes:
+        name, _, text = change.partition("=")
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not isfinite(value):
+            raise CommandError(f"simulate: --param {change}: write NAME=VALUE with a number")
+        if name not in DEFAULTS:
+            raise CommandError(f"simulate: --param {change}: the simulated autopilot has no parameter {name!r}")
+        values[name] = value
+    return values
 
 
 def _serve(settings: ProcessSettings) -> None:

@@ -37,8 +37,9 @@ SIMULATED_LATENCY_S = 0.06  # of capture and vision, in lockstep time, where com
 class FlightOptions:
     """What `mission run` was asked to do, checked and typed.
 
-    speed, system: None for the rig file's. confirm: asked before a real vehicle is armed and, with autonomy below full,
-    before marked transitions. on_start: called with the executive once it exists, for the live view. resume: the
+    speed, system: None for the rig file's. must_confirm: whether a person is asked before the vehicle is armed, as
+    `connection.must_confirm` decides. confirm: how, also before marked transitions with autonomy below full.
+    on_start: called with the executive once it exists, for the live view. resume: the
     folder of an interrupted run to go on with.
     """
 
@@ -47,6 +48,7 @@ class FlightOptions:
     speed: float | None = None
     lockstep: bool = False
     system: str | None = None
+    must_confirm: bool = True
     autonomy: Autonomy = "full"
     confirm: Callable[[str], bool] = lambda question: False
     on_start: Callable[[Executive], None] = lambda executive: None
@@ -97,15 +99,21 @@ async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, l
     try:
         try:
             await stage.autopilot.connect(CONNECT_S)
+            if stage.check is not None:
+                await stage.check()
+            if options.must_confirm and not options.confirm(f"Arm and fly {options.mission.name} for real?"):
+                return FlightResult("refused", options.mission.initial, False)
+            for name, value in stage.parameters.items():
+                await stage.autopilot.set_parameter(name, value)
         except AutopilotError as error:
             raise FlightError(str(error)) from error
-        if not stage.autopilot.simulated and not options.confirm(f"Arm and fly {options.mission.name} for real?"):
-            return FlightResult("refused", options.mission.initial, False)
         journal = Journal(options.folder.journal, threaded=not options.lockstep)
         recorder = RunRecorder(options.folder, stage.rig.geometry.stereo.left, log, inline=options.lockstep)
         executive, running = _compose(options, stage, journal, recorder, past, log)
         loop = asyncio.get_running_loop()
         tasks = [loop.create_task(work, name=name) for name, work in running.items()]
+        for task in tasks:
+            task.add_done_callback(lambda ended: _watch(ended, executive, log))
         options.on_start(executive)
         listening = nullcontext() if options.lockstep else serving(executive, options.folder.path)
         gc.collect()
@@ -118,12 +126,24 @@ async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, l
         for task in tasks:
             task.cancel()
         with suppress(asyncio.CancelledError):
-            await asyncio.gather(*tasks, return_exceptions=True)
+            for task, ended in zip(tasks, await asyncio.gather(*tasks, return_exceptions=True), strict=True):
+                if isinstance(ended, Exception):
+                    log.error("task had failed", task=task.get_name(), exc_info=ended)
         await stage.autopilot.close()
         if recorder is not None:
             recorder.close()
         if journal is not None:
             journal.close()
+
+
+def _watch(task: asyncio.Task[None], executive: Executive, log: Any) -> None:
+    """What runs beside the executive ends only by being cancelled; else the flight is no longer what it should be."""
+    if task.cancelled():
+        return
+    error = task.exception()
+    text = "it returned" if error is None else f"{type(error).__name__}: {error}".splitlines()[0][:300]
+    log.error("task ended", task=task.get_name(), error=text, exc_info=error)
+    executive.raise_event("abort", error=f"{task.get_name()} ended: {text}")
 
 
 def _compose(
@@ -156,6 +176,7 @@ def _compose(
         KeepOut(turbine, mission.limits.clearance_m),
         on_sent=recorder.sent,
         on_event=lambda name: executive.raise_event(name),
+        on_error=lambda error: log.error("setpoint failed", exc_info=error),
         wall=stage.clock.now if options.lockstep else time.monotonic,
     )
     perception = VisionLoop(
@@ -169,6 +190,7 @@ def _compose(
         mount=mission.rig.mount_m,
         sink=recorder,
         pace=stage.pace,
+        log=log,
         latency_s=SIMULATED_LATENCY_S if options.lockstep else 0.0,
     )
 
@@ -201,6 +223,7 @@ def _compose(
         ask=asking(options.confirm, at_once=options.lockstep),
         autonomy=options.autonomy,
         resume=None if past is None else where(mission, past, in_air=in_air),
+        gone=stage.gone,
     )
     beside: dict[str, Coroutine[Any, Any, None]] = {
         "vision": perception.run(),

@@ -59,8 +59,9 @@ def rig_geometry(rig: RigFile, folder: Path) -> RigGeometry:
 
         stereo = read_camchain(folder / rig.camchain)
     else:
-        assert rig.camera is not None
-        camera = rig.camera
+        from mission.language.rig_file import CameraSection
+
+        camera = rig.camera or CameraSection(width=640, height=512, focal_px=600.0, baseline_m=0.2)  # of no cameras
         lens = Camera(
             camera.width,
             camera.height,

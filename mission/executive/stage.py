@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mission.executive.belief import rig_geometry
 from mission.executive.clock import LockstepClock, LockstepLoop, WallClock
+from mission.executive.connection import (
+    EMBEDDED,
+    SIMULATED_KINDS,
+    gimbal_for,
+    is_simulated,
+    parameters_at,
+    speed_for,
+    speed_mismatch,
+    system_of,
+)
 from mission.executive.simulation import Switch, build_world
 
 if TYPE_CHECKING:
@@ -31,7 +41,9 @@ class FlightError(RuntimeError):
 
 @dataclass
 class Stage:
-    """One flight's surroundings. world: None without a simulated one. switch: faults of the simulated vehicle."""
+    """One flight's surroundings. world: None without a simulated one. switch: faults of the simulated vehicle.
+    check: what is looked at once the vehicle is connected; raises FlightError. parameters: what the autopilot is given
+    before it is armed."""
 
     loop_factory: Callable[[], asyncio.AbstractEventLoop]
     clock: Clock
@@ -40,6 +52,8 @@ class Stage:
     world: World | None = None
     switch: Switch | None = None
     pace: Pace | None = None
+    check: Callable[[], Awaitable[None]] | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 @contextmanager
@@ -69,22 +83,25 @@ def lockstep_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Sta
     def switch(name: str, **arguments: object) -> None:
         switches.run(name, arguments)
 
-    yield Stage(lambda: LockstepLoop(autopilot.advance), clock, autopilot, rig, world, switch)
+    parameters = parameters_at(mission.rig.parameters, 1.0)
+    yield Stage(lambda: LockstepLoop(autopilot.advance), clock, autopilot, rig, world, switch, parameters=parameters)
 
 
 @contextmanager
 def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
     """A vehicle behind a socket, ours or another, and wall time, scaled where the vehicle's time is."""
+    from devices.rig import CaptureError
     from flight.mavsdk_link import MavsdkAutopilot
 
     mission = options.mission
     rig_file = mission.rig
-    system = options.system or rig_file.system
-    speed = options.speed or rig_file.speed
+    system = system_of(rig_file, options.system)
+    speed = speed_for(rig_file, options.system, options.speed)
+    simulated = is_simulated(rig_file, options.system)
     with ExitStack() as stack:
         vehicle = None
-        world = build_world(mission) if rig_file.kind in ("simulated", "px4_sitl") else None
-        if system == "embedded":
+        world = build_world(mission) if rig_file.kind in SIMULATED_KINDS else None
+        if system == EMBEDDED:
             vehicle = _spawn(options, speed)
             stack.callback(vehicle.stop)
             system = vehicle.system_address
@@ -93,10 +110,13 @@ def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
         autopilot = MavsdkAutopilot(
             system,
             clock,
-            simulated=world is not None,
-            gimbal="process" if rig_file.gimbal == "in_process" else "mavlink",
+            simulated=simulated,
+            gimbal=gimbal_for(rig_file, options.system),
         )
-        rig, switch = _rig(options, stack, world, vehicle, clock, autopilot)
+        try:
+            rig, switch = _rig(options, stack, world, vehicle, clock, autopilot)
+        except CaptureError as error:
+            raise FlightError(str(error)) from error
         stack.callback(rig.close)
         pace = None
         if switch is not None:
@@ -104,7 +124,16 @@ def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
 
             throw = switch
             pace = Pace(clock, speed, lambda faster: throw("speed", speed=faster))
-        yield Stage(asyncio.new_event_loop, clock, autopilot, rig, world, switch, pace)
+
+        async def same_time() -> None:
+            complaint = None if vehicle is not None else await speed_mismatch(autopilot, speed, system)
+            if complaint is not None:
+                raise FlightError(complaint)
+
+        parameters = parameters_at(rig_file.parameters, speed) if simulated else {}  # a real one's are its owner's
+        yield Stage(
+            asyncio.new_event_loop, clock, autopilot, rig, world, switch, pace, check=same_time, parameters=parameters
+        )
 
 
 def _geometry(options: FlightOptions) -> RigGeometry:
@@ -178,7 +207,14 @@ def _rig(
 
         folder = mission.path.parent / str(mission.rig.frames)
         return RecordedRig(folder, _geometry(options), clock.now), None
-    raise FlightError(
-        f"rig kind {mission.rig.kind!r}: no camera driver is installed for it; write one beside devices/rig.py "
-        "and choose it in mission/executive/stage.py"
-    )
+    from devices.camera_drivers import DRIVERS, open_rig
+
+    if mission.rig.camera_driver is None:
+        raise FlightError(f"the rig has no camera driver: give its rig file `camera_driver: {' | '.join(DRIVERS)}`")
+    sources = [source if isinstance(source, int) else _source(options, source) for source in mission.rig.sources]
+    return open_rig(mission.rig.camera_driver, _geometry(options), sources, clock.now), None
+
+
+def _source(options: FlightOptions, source: str) -> str:
+    """An address, or a file, looked for beside the mission."""
+    return source if "://" in source else str(options.mission.path.parent / source)

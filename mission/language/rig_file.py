@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from devices.camera_drivers import DRIVERS
 from mission.language.file_model import Degrees, FileModel, Vector
 
 
@@ -57,11 +58,28 @@ class RigFile(FileModel):
     )
     gimbal_pitch_deg: tuple[Degrees, Degrees] = Field((-90.0, 60.0), description="Lowest and highest pitch it reaches.")
     frames: str | None = Field(None, description="Folder of the recorded frames, beside this file; only kind recorded.")
-    confirm_arming: bool | None = Field(None, description="Ask before arming; by default for kind hardware alone.")
+    camera_driver: str | None = Field(
+        None,
+        json_schema_extra={"enum": [*DRIVERS, None]},
+        description="Who takes the pictures of kind hardware: "
+        + ". ".join(f"{name}: {driver.text}" for name, driver in DRIVERS.items())
+        + ".",
+    )
+    sources: tuple[int | str, ...] = Field(
+        (), description="The left and the right camera for its driver: numbers, devices, files or addresses."
+    )
+    parameters: dict[str, float] = Field(
+        default_factory=dict,
+        description="Parameters that a simulated autopilot is given; COM_OF_LOSS_T in wall seconds.",
+    )
+    confirm_arming: bool | None = Field(
+        None, description="Ask before arming; by default for kind hardware, serial lines and other machines."
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> RigFile:
-        if (self.camera is None) == (self.camchain is None):
+        blind = self.camera_driver == "none" and self.camera is None and self.camchain is None
+        if not blind and (self.camera is None) == (self.camchain is None):
             raise ValueError("give exactly one of camera and camchain")
         if self.system == "embedded" and self.kind in ("px4_sitl", "hardware"):
             raise ValueError(f"kind {self.kind} needs system: a MAVSDK connection such as udpin://0.0.0.0:14540")
@@ -69,4 +87,12 @@ class RigFile(FileModel):
             raise ValueError("frames belongs to kind recorded, and recorded needs it")
         if self.speed != 1.0 and self.kind == "hardware":
             raise ValueError("speed must be 1 for real hardware")
+        if self.parameters and self.kind not in ("simulated", "px4_sitl"):
+            raise ValueError(f"parameters are for simulated autopilots: set those of kind {self.kind} in a GCS")
+        if self.camera_driver is not None and self.kind != "hardware":
+            raise ValueError("camera_driver belongs to kind hardware")
+        if self.camera_driver is not None and self.camera_driver not in DRIVERS:
+            raise ValueError(f"camera_driver {self.camera_driver!r}: choose one of {', '.join(DRIVERS)}")
+        if len(self.sources) != (2 if self.camera_driver == "opencv" else 0):
+            raise ValueError("sources names two cameras, left and right, for a camera_driver that opens them")
         return self

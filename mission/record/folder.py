@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+NEEDED_WITHOUT_FRAMES_MB = 20
 NEEDED_MB = 300
 """A run of the default mission leaves about 60 MB; a long one must not die of a full disk near the blade."""
 
@@ -82,6 +83,8 @@ def create(logs: Path, mission: str, resolved_yaml: str, needed_mb: int = NEEDED
     path: Path | None = None
     try:
         logs.mkdir(parents=True, exist_ok=True)
+        if not os.access(logs, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(logs))
         free_mb = shutil.disk_usage(logs).free // 2**20
         if free_mb < needed_mb:
             raise RunFolderError(
