@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -220,3 +221,72 @@ def test_a_real_vehicle_does_not_fly_faster_than_time(call: Call, flights: Any, 
     rig = a_real_rig(tmp_path)
     call("run", BLADE, "--rig", rig, "--record", tmp_path / "logs", "--yes", "--speed", "4").assert_one_line(2)
     call("run", BLADE, "--rig", rig, "--record", tmp_path / "logs", "--yes", "--lockstep").assert_one_line(2)
+
+
+@pytest.mark.parametrize("system", ["banana", "udpin://", "udpout://10.0.0.5"])
+def test_an_address_that_is_none_is_a_wrong_command_line(call: Call, flights: Any, tmp_path: Path, system: str) -> None:
+    asked = flights(ends("completed"))
+    said = call("run", BLADE, "--system", system, "--record", tmp_path / "logs", "--yes")
+    said.assert_one_line(2)
+    assert system in said.err
+    assert asked == []
+    assert not (tmp_path / "logs").exists()
+
+
+@pytest.mark.parametrize("system", ["serial:///dev/ttyACM0:921600", "udpout://192.168.1.2:14580"])
+def test_a_vehicle_on_a_serial_line_or_another_machine_is_real_whatever_the_rig_draws(
+    call: Call, flights: Any, tmp_path: Path, system: str
+) -> None:
+    asked = flights(ends("completed"))
+    said = call("run", BLADE, "--system", system, "--record", tmp_path / "logs")
+    said.assert_one_line(2)
+    assert "--yes" in said.err
+    assert asked == []
+    assert call("run", BLADE, "--system", system, "--record", tmp_path / "logs", "--yes").code == 0
+    assert asked[0].must_confirm
+
+
+def test_a_simulated_vehicle_that_sends_here_flies_without_a_yes(call: Call, flights: Any, tmp_path: Path) -> None:
+    asked = flights(ends("completed"))
+    assert call("run", BLADE, "--system", "udpin://0.0.0.0:14540", "--record", tmp_path).code == 0
+    assert call("run", BLADE, "--record", tmp_path, "--set", "rig.confirm_arming=true", "--yes").code == 0
+    assert [options.must_confirm for options in asked] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("flags", "named"), [(("--speed", "2"), "--speed"), (("--system", "udpin://0.0.0.0:14540"), "--system")]
+)
+def test_lockstep_names_the_flag_that_it_does_not_go_with(
+    call: Call, flights: Any, tmp_path: Path, flags: tuple[str, ...], named: str
+) -> None:
+    flights(ends("completed"))
+    said = call("run", BLADE, "--lockstep", *flags, "--record", tmp_path / "logs")
+    said.assert_one_line(2)
+    assert said.err.split("leave out ")[1].strip() == named
+
+
+def test_a_serial_line_that_is_not_there_is_one_line(call: Call, tmp_path: Path) -> None:
+    rig = tmp_path / "drone.yaml"
+    rig.write_text("kind: hardware\nsystem: serial:///dev/ttyNOWHERE:57600\ncamera_driver: none\n")
+    said = call("run", BLADE, "--rig", rig, "--record", tmp_path / "logs", "--yes", "--headless")
+    said.assert_one_line(3)
+    assert "there is no /dev/ttyNOWHERE" in said.err
+    assert list((tmp_path / "logs").iterdir()) == []
+
+
+def test_only_a_mission_that_takes_pictures_needs_room_for_them(
+    call: Call, flights: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: type("Usage", (), {"free": 100 << 20}))
+    flights(ends("completed"))
+    assert call("run", ROOT / "missions" / "square.yaml", "--record", tmp_path / "a").code == 0
+    said = call("run", BLADE, "--record", tmp_path / "b")
+    said.assert_one_line(2)
+    assert "needs 300 MB" in said.err
+
+
+def test_a_parameter_that_the_simulated_autopilot_lacks_is_one_line(call: Call) -> None:
+    for change in ("COM_NOTHING=1", "COM_OBL_RC_ACT", "COM_OBL_RC_ACT=much"):
+        said = call("simulate", "--param", change)
+        said.assert_one_line(2)
+        assert change in said.err
