@@ -1,4 +1,5 @@
-"""The rig: what takes pictures and throws dots. One Protocol; drivers, recordings and the simulated world stand side by side."""
+"""The rig: what takes pictures and throws dots. One Protocol; drivers, recordings and the simulated world stand
+side by side."""
 
 from __future__ import annotations
 
@@ -15,15 +16,16 @@ class CaptureError(RuntimeError):
 class Rig(Protocol):
     """A stereo camera pair with a switched laser.
 
-    `capture` blocks for as long as an exposure takes and is called from the vision thread alone. `simulated` says that no
-    real light is involved.
+    `capture` blocks for as long as an exposure takes and is called from the vision thread alone. `simulated` says
+    that no real light is involved.
     """
 
     geometry: RigGeometry
     simulated: bool
 
     def capture(self, laser: bool = True) -> StereoFrames:
-        """One set of frames, stamped on the executive's clock, `pose` None. Without `laser` the laser-on images are None.
+        """One set of frames, stamped on the executive's clock, `pose` None. Without `laser` the laser-on images are
+        None.
 
         Raises:
             CaptureError: no images this time.

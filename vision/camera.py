@@ -1,7 +1,8 @@
 """Cameras, the stereo pair and the laser's grid, in the camera frame: x along the optical axis, y right, z down.
 
-Pixels are (u, v), u to the right and v down, with (0, 0) at the *centre* of the first pixel, as in OpenCV. The image frame
-of this project has its origin at the image centre, `((width - 1) / 2, (height - 1) / 2)`, with the same axes.
+Pixels are (u, v), u to the right and v down, with (0, 0) at the *centre* of the first pixel, as in OpenCV. The
+image frame of this project has its origin at the image centre, `((width - 1) / 2, (height - 1) / 2)`, with the same
+axes.
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ class Camera:
 class StereoPair:
     """Two cameras. A point p of the left camera's frame is `rotation @ p + translation` in the right camera's frame.
 
-    rotation (3, 3) and translation (3,) in metres, both in camera axes (x forward, y right, z down). With a right camera
-    displaced by the baseline T to the right, and no rotation, translation is (0, -T, 0).
+    rotation (3, 3) and translation (3,) in metres, both in camera axes (x forward, y right, z down). With a right
+    camera displaced by the baseline T to the right, and no rotation, translation is (0, -T, 0).
     """
 
     left: Camera
@@ -104,8 +105,8 @@ class StereoPair:
 class LaserGrid:
     """A laser that throws rows × columns dots, evenly spaced on a wall at right angles to its axis.
 
-    fan: full angles (across the columns, across the rows) in radians. position (3,) in metres and rotation (3, 3), laser
-    axes to camera axes, place it in the left camera's frame; its own axes are x forward, y right, z down.
+    fan: full angles (across the columns, across the rows) in radians. position (3,) in metres and rotation (3, 3),
+    laser axes to camera axes, place it in the left camera's frame; its own axes are x forward, y right, z down.
     Row 0 is the top row, column 0 the leftmost.
     """
 

@@ -37,8 +37,8 @@ class CameraPose:
 class StereoFrames:
     """Left and right images, laser off and laser on: each (h, w) grey or (h, w, 3) BGR, uint8, or None where missing.
 
-    `stamp_s` is the exposure on the executive's clock. `pose` is where the vehicle's *telemetry* says the left camera was;
-    the rig leaves it None, since a camera does not know.
+    `stamp_s` is the exposure on the executive's clock. `pose` is where the vehicle's *telemetry* says the left
+    camera was; the rig leaves it None, since a camera does not know.
     """
 
     stamp_s: float

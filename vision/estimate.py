@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 class BladeFrame:
     """Where the blade is thought to lie, in local NED, fixed from the survey until it is told to forget.
 
-    origin (3,): hub centre. Unit vectors (3,): `span` from the hub to the tip, `across` toward the leading side, at right
-    angles to it in the rotor plane, and `depth` away from the vehicle, from the front to the back. Points of the blade have
-    coordinates (station, offset, depth) in metres along these.
+    origin (3,): hub centre. Unit vectors (3,): `span` from the hub to the tip, `across` toward the leading side, at
+    right angles to it in the rotor plane, and `depth` away from the vehicle, from the front to the back. Points of
+    the blade have coordinates (station, offset, depth) in metres along these.
     """
 
     origin: Array
@@ -44,8 +44,9 @@ class BladeFrame:
 
 @dataclass(frozen=True)
 class SideEstimate:
-    """One edge as tracked: its offset (m, along `across`) at the present station, the slope per metre of station, and both
-    standard deviations; `line` is it as the left camera would see it now (None where it cannot), `age_s` since last seen."""
+    """One edge as tracked: its offset (m, along `across`) at the present station, the slope per metre of station,
+    and both standard deviations; `line` is it as the left camera would see it now (None where it cannot), `age_s`
+    since last seen."""
 
     offset_m: float
     slope: float
@@ -60,9 +61,10 @@ class SideEstimate:
 class BladeEstimate:
     """State and covariance of the blade around `station_m`, predicted to `stamp_s` and seen from the pose of that time.
 
-    age_s: since the last accepted observation. distance_m: from the left camera along the optical axis to the surface, with
-    its sigma. nearest_m: from the camera to the nearest point of the tracked surface between its edges. normal (3,): of the
-    surface, local NED, toward the vehicle. point (3,): where the optical axis meets the surface, local NED.
+    age_s: since the last accepted observation. distance_m: from the left camera along the optical axis to the
+    surface, with its sigma. nearest_m: from the camera to the nearest point of the tracked surface between its
+    edges. normal (3,): of the surface, local NED, toward the vehicle. point (3,): where the optical axis meets the
+    surface, local NED.
     depth_m, depth_slope, across_slope: the surface in blade coordinates, depth = depth_m + depth_slope (s - station_m)
     + across_slope (n - offset of `point`). leading, trailing: the edges, None before first seen.
     heading: direction from root to tip in the image now, radians. state (n,), covariance (n, n): for the record.

@@ -13,7 +13,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Line:
-    """A line in the image frame: theta in radians, clockwise from +y_im, is the direction of the normal; rho ≥ 0 in pixels."""
+    """A line in the image frame: theta in radians, clockwise from +y_im, is the direction of the normal; rho ≥ 0 in
+    pixels."""
 
     theta: float
     rho: float
@@ -39,7 +40,8 @@ class Edge:
 
 @dataclass(frozen=True)
 class Tip:
-    """The end of the blade: the line across it, and the outermost point (2,) on the blade's axis, in the image frame."""
+    """The end of the blade: the line across it, and the outermost point (2,) on the blade's axis, in the image
+    frame."""
 
     line: Line
     point: Array
@@ -48,7 +50,8 @@ class Tip:
 
 @dataclass(frozen=True)
 class Dots:
-    """Laser dots in one image: uv (n, 2) in pixels (not the image frame), row (n,) and column (n,) in the laser's grid."""
+    """Laser dots in one image: uv (n, 2) in pixels (not the image frame), row (n,) and column (n,) in the laser's
+    grid."""
 
     uv: Array
     row: NDArray[np.int64]
@@ -67,9 +70,11 @@ class BladeObservation:
     points (n, 3) m in the camera frame and sigma_m (n,) along the viewing ray, on the blade alone.
     plane: unit normal (3,) toward the camera and the point (3,) m at which the optical axis meets the surface.
     plane_covariance (3, 3): of (depth at the optical axis m, d depth / d y, d depth / d z).
-    distance_m: depth of the surface along the optical axis. nearest_m: least distance of a measured point from the lens.
+    distance_m: depth of the surface along the optical axis. nearest_m: least distance of a measured point from the
+    lens.
     edges: none, one or two, first the one whose outward normal lies to the left of the axis direction `heading`.
-    heading: direction of the blade's axis in the image, radians modulo π. chord_m: between the two edges where both are seen.
+    heading: direction of the blade's axis in the image, radians modulo π. chord_m: between the two edges where both
+    are seen.
     sharpness: 0 (blurred) to 1. exposure: mean grey of the blade, 0 to 255.
     """
 
