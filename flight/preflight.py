@@ -45,13 +45,18 @@ class Finding:
 
 
 async def check(
-    autopilot: Autopilot, *, battery_percent: float, speed: float = 1.0, gimbal: bool = True
+    autopilot: Autopilot,
+    *,
+    battery_percent: float,
+    speed: float = 1.0,
+    gimbal: bool = True,
+    ours: bool = False,
 ) -> list[Finding]:
     """Findings in a fixed order; the vehicle is fit where none refuses. `battery_percent` is the least to start with,
     `speed` the simulation's factor, by which PX4's start script multiplies its time-outs. Without `gimbal` none is
-    needed from the autopilot."""
+    needed from the autopilot. `ours`: the mission may have armed it already, before it was cut off."""
     telemetry = autopilot.telemetry
-    findings = [look(telemetry) for look in (_link, _armable, _position)]
+    findings = [_link(telemetry), _free(telemetry, ours), _armable(telemetry), _position(telemetry)]
     findings.append(_battery(telemetry, battery_percent))
     try:
         values: Values = await autopilot.parameters(PARAMETERS)
@@ -70,6 +75,14 @@ def _link(telemetry: Telemetry) -> Finding:
     return Finding(
         "link", "refuse", f"nothing heard for {telemetry.link_age_s:.1f} s", "check the cable or radio to the autopilot"
     )
+
+
+def _free(telemetry: Telemetry, ours: bool) -> Finding:
+    if telemetry.in_air:
+        return Finding("free", "refuse", "it is in the air already: somebody else flies it", "land it first")
+    if telemetry.armed and not ours:
+        return Finding("free", "refuse", "it is armed already, by somebody else", "disarm it first")
+    return Finding("free", "ok", "on the ground, and nobody else's")
 
 
 def _armable(telemetry: Telemetry) -> Finding:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import fly_to, line_of_sight, stay
+from mission.behaviours.motion import engage, fly_to, line_of_sight, stay
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -24,6 +24,8 @@ class BackOff(Parameters):
 async def back_off(services: Services, parameters: BackOff) -> str:
     """Stop, then fly back along the line of sight, away from the blade. Needs no images."""
     services.perception.record(None)
+    if not await engage(services):
+        return "done"
     here = stay(services)
     goal = here.position - line_of_sight(services) * parameters.distance_m
     await fly_to(services, goal, here.yaw, speed_m_s=parameters.speed_m_s, tolerance_m=1.0, gimbal_pitch=None)

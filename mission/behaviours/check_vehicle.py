@@ -17,16 +17,21 @@ MARGIN_PERCENT = 10.0  # a flight that begins at its limit would end at once
     airborne=False,
 )
 async def check_vehicle(services: Services, parameters: NoParameters) -> str:
-    """Check health, battery, failsafe parameters and the rig; refuse what would hurt beside a turbine."""
+    """Check health, battery, failsafe parameters and the rig; refuse what would hurt beside a turbine.
+
+    A vehicle that somebody else has armed, or flies, is refused too.
+    """
     from flight.preflight import check
 
-    while not services.autopilot.telemetry.armable:
+    autopilot, ours = services.autopilot, services.commanded.resumed
+    while not (autopilot.telemetry.armable or autopilot.telemetry.armed or autopilot.telemetry.in_air):
         services.progress.text = "waiting until the vehicle can be armed"
         await services.clock.sleep(0.5)
     findings = await check(
-        services.autopilot,
+        autopilot,
         battery_percent=services.mission.limits.battery_percent + MARGIN_PERCENT,
         speed=services.clock.speed,
+        ours=ours,
     )
     for finding in findings:
         services.log.info("preflight", code=finding.code, level=finding.level, text=finding.text, remedy=finding.remedy)

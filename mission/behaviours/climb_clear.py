@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import fly_to, line_of_sight, target_or_here
+from mission.behaviours.motion import engage, fly_to, line_of_sight, target_or_here
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -24,6 +24,8 @@ class ClimbClear(Parameters):
 @behaviour(outcomes={"done": "the straight way home is free"}, parameters=ClimbClear)
 async def climb_clear(services: Services, parameters: ClimbClear) -> str:
     """Climb above the rotor, further from it first, if the straight way home would pass through the keep-out volume."""
+    if not await engage(services):
+        return "done"
     home = np.array(services.memory.home or (0.0, 0.0, 0.0))
     here = target_or_here(services)
     over_home = np.array([home[0], home[1], here.position[2]])

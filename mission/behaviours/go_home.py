@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import fly_to, target_or_here
+from mission.behaviours.motion import engage, fly_to, target_or_here
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -25,6 +25,8 @@ class GoHome(Parameters):
 async def go_home(services: Services, parameters: GoHome) -> str:
     """Fly to above the take-off point and descend: straight where the way is free. Needs no images."""
     services.perception.watch_blade(False)
+    if not await engage(services):
+        return "done"
     home = np.array(services.memory.home or (0.0, 0.0, 0.0))
     here = target_or_here(services)
     above = np.array([home[0], home[1], home[2] - parameters.height_m])

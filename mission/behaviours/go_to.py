@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import fly_to, target_or_here
+from mission.behaviours.motion import engage, fly_to, target_or_here
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -27,6 +27,8 @@ class GoTo(Parameters):
 @behaviour(outcomes={"arrived": "at the place, nearly at rest"}, parameters=GoTo)
 async def go_to(services: Services, parameters: GoTo) -> str:
     """Fly a straight line to a place relative to the take-off point. Needs no images."""
+    if not await engage(services):
+        return "arrived"
     home = np.array(services.memory.home or (0.0, 0.0, 0.0))
     place = home + np.array([parameters.north_m, parameters.east_m, -parameters.height_m])
     yaw = target_or_here(services).yaw if parameters.heading_deg is None else np.deg2rad(parameters.heading_deg)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import stay
+from mission.behaviours.motion import engage, stay
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -22,6 +22,8 @@ class Hold(Parameters):
 @behaviour(outcomes={"done": "the time is over"}, parameters=Hold)
 async def hold(services: Services, parameters: Hold) -> str:
     """Hold position, laser and recording off, for a time or until something else happens."""
+    if not await engage(services):
+        return "done"
     stay(services)
     services.perception.record(None)
     services.perception.watch_blade(False)

@@ -13,15 +13,24 @@ if TYPE_CHECKING:
 RETRY_S = 3.0
 
 
-@behaviour(outcomes={"landed": "on the ground and disarmed"}, airborne=None)
+@behaviour(outcomes={"landed": "on the ground and disarmed, or never this mission's to land"}, airborne=None)
 async def land(services: Services, parameters: NoParameters) -> str:
-    """Land where it is with the autopilot's own landing and wait until it has disarmed; ask again until obeyed."""
-    autopilot = services.autopilot
+    """Land where it is with the autopilot's own landing and wait until it has disarmed; ask again until obeyed.
+
+    Once it was seen landing it is not asked again: who ends that landing wants the vehicle. Nor is a vehicle that
+    somebody else flies; the monitors say so, and end this.
+    """
+    autopilot, commanded = services.autopilot, services.commanded
     services.perception.watch_blade(False)
-    asked_s = -RETRY_S
+    if not commanded.took_over:
+        services.log.warning("land", error="this mission neither armed nor flew the vehicle: it is left alone")
+        return "landed"
+    asked_s = float("-inf")
     while autopilot.telemetry.armed or autopilot.telemetry.in_air:
         now = services.clock.now()
-        if autopilot.telemetry.flight_mode != "LAND" and now - asked_s >= RETRY_S * max(1.0, services.clock.speed / 2):
+        begun = autopilot.telemetry.flight_mode == "LAND" or (commanded.mode == "LAND" and commanded.obeyed)
+        patience = RETRY_S * max(1.0, services.clock.speed / 2)
+        if not begun and services.ours and now - asked_s >= patience:
             asked_s = now
             try:
                 await autopilot.land()

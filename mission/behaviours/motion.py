@@ -37,6 +37,28 @@ def stay(services: Services) -> Setpoint:
     return services.setpoints.target
 
 
+async def engage(services: Services) -> bool:
+    """Make sure that the target is flown to: in the air and without a stream, begin one here.
+
+    False where there is nothing to fly: the vehicle is on the ground. While somebody else flies, wait for the event
+    that says so; nothing is commanded.
+
+    Raises:
+        AutopilotError: OFFBOARD was refused.
+    """
+    telemetry = services.autopilot.telemetry
+    if services.streaming:
+        return telemetry.in_air or telemetry.armed
+    if not telemetry.in_air:
+        return False
+    while not (services.ours and services.commanded.took_over):
+        services.progress.text = f"somebody else flies: {services.autopilot.telemetry.flight_mode}"
+        await services.clock.sleep(0.2)
+    pose = services.autopilot.telemetry.pose
+    await services.setpoints.start(Setpoint(pose.position.copy(), float(pose.attitude[2])))
+    return True
+
+
 async def fly_to(
     services: Services,
     position: Array,
@@ -51,6 +73,8 @@ async def fly_to(
     The target slides along the line at `speed_m_s`, never more than a leash ahead of the vehicle. The keep-out volume
     still bounds every setpoint: a place inside it is never reached, and the state's deadline ends the attempt.
     """
+    if not await engage(services):
+        return
     last = services.clock.now()
     carrot, heading = target_or_here(services).position.copy(), target_or_here(services).yaw
     async for now in services.ticks():

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 
 CLIMB_M_S = 1.5
+HOLDS_BELOW_M = 2.0  # the autopilot's take-off is over, and it holds, within its own tolerance below the height
+REPORT_S = 1.0  # wall; a mode may be reported that late
 
 
 class TakeOff(Parameters):
@@ -43,14 +45,19 @@ async def take_off(services: Services, parameters: TakeOff) -> str:
             return "failed"
         here = Setpoint(ground.copy(), float(autopilot.telemetry.pose.attitude[2]))
         return await _climb_on(services, here, home[2] - parameters.height_m)
+    if autopilot.telemetry.armed and not services.commanded.took_over:
+        services.progress.text = "armed by somebody else"
+        return "failed"
     services.memory.home = (float(ground[0]), float(ground[1]), float(ground[2]))
     try:
         if not autopilot.telemetry.armed:
             await autopilot.arm()
         await autopilot.take_off(parameters.height_m)
-        while (climbed := float(ground[2] - autopilot.telemetry.pose.position[2])) < parameters.height_m - 0.7:
-            services.progress.text = f"{climbed:.1f} of {parameters.height_m:.0f} m"
-            await services.clock.sleep(0.2)
+        if not await _climbed(services, float(ground[2]), parameters.height_m):
+            mode = autopilot.telemetry.flight_mode
+            services.progress.text = f"the take-off was ended by somebody else: {mode}"
+            services.raise_event("vehicle_failsafe", mode=mode)
+            return "failed"
         pose = autopilot.telemetry.pose
         await services.setpoints.start(Setpoint(pose.position.copy(), float(pose.attitude[2])))
         await autopilot.take_gimbal()
@@ -59,6 +66,23 @@ async def take_off(services: Services, parameters: TakeOff) -> str:
         services.log.warning("take_off", error=str(error))
         return "failed"
     return "done"
+
+
+async def _climbed(services: Services, ground: float, height_m: float) -> bool:
+    """Wait for the height over `ground` m, down in local NED; False if somebody else has ended the take-off before."""
+    foreign_s = 0.0
+    while True:
+        telemetry = services.autopilot.telemetry
+        climbed = ground - float(telemetry.pose.position[2])
+        early = climbed < height_m - HOLDS_BELOW_M and services.commanded.obeyed
+        foreign = not services.ours or (early and telemetry.flight_mode in ("HOLD", "LOITER"))
+        if climbed >= height_m - 0.7 and not foreign:
+            return True
+        if foreign and foreign_s > REPORT_S * services.clock.speed:
+            return False
+        services.progress.text = f"{climbed:.1f} of {height_m:.0f} m"
+        await services.clock.sleep(0.2)
+        foreign_s = foreign_s + 0.2 if foreign else 0.0
 
 
 async def _climb_on(services: Services, here: Setpoint, down: float) -> str:

@@ -57,6 +57,7 @@ class Conductor:
         self._clock, self._resumed = clock, resume is not None
         self._autopilot = services.autopilot
         self._gate = Gate()
+        services.commanded.resumed = self._resumed
         self._queue = EventQueue()
         self._helm = Helm(services, self._gate, lambda gap_s: self.raise_event("setpoints_stalled", gap_s=gap_s))
         guard_services(services, self._gate)
@@ -242,6 +243,7 @@ class Conductor:
         state = self.mission.states[self.state]
         behaviour = self._work.behaviour
         keeps = behaviour is not None and behaviour.keeps_standoff
+        self.services.commanded.reported(self._autopilot.telemetry.flight_mode)
         return snapshots.take(
             self.services,
             entered_s=self._timing.entered_s.get(state.path, 0.0),

@@ -6,6 +6,8 @@ import asyncio
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from mission.executive.commanded import MODE_OF, Commanded
+
 if TYPE_CHECKING:
     from mission.executive.services import Services
 
@@ -51,29 +53,38 @@ class Gate:
 
 
 class _Guarded:
-    """Passes everything through to what it guards, while the gate lets it."""
+    """Passes everything through to what it guards, while the gate lets it, and remembers what is commanded."""
 
-    def __init__(self, guarded: Any, gate: Gate) -> None:
+    def __init__(self, guarded: Any, gate: Gate, commanded: Commanded) -> None:
         object.__setattr__(self, "_guarded", guarded)
         object.__setattr__(self, "_gate", gate)
+        object.__setattr__(self, "_commanded", commanded)
 
     def __getattr__(self, name: str) -> Any:
         self._gate.check(command=name in _COMMANDS)
-        return getattr(self._guarded, name)
+        found = getattr(self._guarded, name)
+        if name != "arm" and name not in MODE_OF:
+            return found
+
+        def command(*values: Any, **named: Any) -> Any:
+            self._commanded.asks(name)
+            return found(*values, **named)
+
+        return command
 
     def __setattr__(self, name: str, value: Any) -> None:
         self._gate.check(command=True)
         setattr(self._guarded, name, value)
 
 
-def guard(value: T, gate: Gate) -> T:
+def guard(value: T, gate: Gate, commanded: Commanded | None = None) -> T:
     """The same thing behind the gate."""
-    return cast(T, _Guarded(value, gate))
+    return cast(T, _Guarded(value, gate, commanded or Commanded()))
 
 
 def guard_services(services: Services, gate: Gate) -> None:
     """Put everything with which a behaviour acts behind the gate, in place."""
-    services.autopilot = guard(services.autopilot, gate)
-    services.setpoints = guard(services.setpoints, gate)
+    services.autopilot = guard(services.autopilot, gate, services.commanded)
+    services.setpoints = guard(services.setpoints, gate, services.commanded)
     services.perception = guard(services.perception, gate)
     services.clock = guard(services.clock, gate)

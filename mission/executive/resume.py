@@ -121,6 +121,9 @@ async def take_up(services: Services, mission: Mission, configuration: Configura
     if telemetry.flight_mode in STICKS:
         services.raise_event("pilot_took_over", mode=telemetry.flight_mode)
         return
+    state = mission.states[configuration.leaf]
+    if state.do is not None and behaviours()[state.do].airborne is False:
+        return  # it was on the ground when that run was cut off: somebody else has flown it since
     try:
         pose = telemetry.pose
         await services.setpoints.start(Setpoint(pose.position.copy(), float(pose.attitude[2])))
@@ -128,7 +131,6 @@ async def take_up(services: Services, mission: Mission, configuration: Configura
     except AutopilotError as error:
         services.raise_event("abort", error=str(error))
         return
-    state = mission.states[configuration.leaf]
     if state.do is not None and behaviours()[state.do].needs_vision and services.perception.estimate() is None:
         services.perception.watch_blade(True)
         if services.memory.hub is not None:

@@ -6,6 +6,8 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
+from mission.executive.commanded import Commanded
+
 if TYPE_CHECKING:
     from flight.autopilot import Autopilot, Setpoint
     from flight.keepout import KeepOut
@@ -116,8 +118,19 @@ class Services:
     rig: Any = None
     progress: Progress = field(default_factory=Progress)
     memory: Memory = field(default_factory=Memory)
+    commanded: Commanded = field(default_factory=Commanded)
     locate: Callable[[Sequence[FarSight]], Turbine | None] = lambda sights: None
     on_turbine_refined: Callable[[Turbine], None] = lambda turbine: None
+
+    @property
+    def streaming(self) -> bool:
+        """Whether setpoints are being sent now."""
+        return bool(getattr(self.setpoints, "streaming", self.setpoints.target is not None))
+
+    @property
+    def ours(self) -> bool:
+        """Whether the flight mode may be this program's own doing; else somebody else flies."""
+        return self.commanded.covers(self.autopilot.telemetry.flight_mode, streaming=self.streaming)
 
     def refine_turbine(self, turbine: Turbine) -> None:
         """Believe another turbine from now on: keep-out, tracker and monitors follow."""

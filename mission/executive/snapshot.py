@@ -28,7 +28,8 @@ class Snapshot:
     needs_vision: the running behaviour cannot work without images. streaming: setpoints are being sent. vision_age_s:
     since the last accepted observation, or since the watch began; None while nobody watches. seen: something has been
     accepted since then. standoff_m: the distance to the blade that the running behaviour keeps. was_ours: since
-    take-off the autopilot has flown in a mode that no pilot chose. laser_fault: the rig's own complaint. home: where
+    take-off the autopilot has flown in a mode that no pilot chose. ours: the flight modes that follow from this
+    program's commands, None where it gave none. laser_fault: the rig's own complaint. home: where
     the flight began, local NED. side: whose frames are being recorded. speed: of mission
     time, in mission seconds per wall second.
     """
@@ -45,6 +46,7 @@ class Snapshot:
     streaming: bool = False
     standoff_m: float | None = None
     was_ours: bool = True
+    ours: frozenset[str] | None = frozenset(("OFFBOARD",))
     home: tuple[float, float, float] | None = None
     laser_on: bool = False
     laser_fault: str | None = None
@@ -97,7 +99,7 @@ def take(
     was_ours: bool = True,
 ) -> Snapshot:
     """The present instant."""
-    perception, setpoints = services.perception, services.setpoints
+    perception = services.perception
     accepted_s = getattr(perception, "last_accepted_s", None)
     watched_s = getattr(perception, "watching_since_s", None)
     return Snapshot(
@@ -110,7 +112,8 @@ def take(
         vision_age_s=getattr(perception, "vision_age_s", None),
         seen=accepted_s is not None and (watched_s is None or accepted_s >= watched_s),
         needs_vision=needs_vision,
-        streaming=bool(getattr(setpoints, "streaming", setpoints.target is not None)),
+        streaming=services.streaming,
+        ours=services.commanded.modes(streaming=services.streaming),
         speed=services.clock.speed,
         standoff_m=standoff_m,
         was_ours=was_ours,

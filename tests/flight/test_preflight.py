@@ -53,6 +53,8 @@ async def test_the_offboard_time_out_is_judged_in_wall_time(seconds, speed, leve
     [
         ({"connected": False, "link_age_s": 3.0}, "link"),
         ({"armable": False}, "armable"),
+        ({"armed": True}, "free"),
+        ({"armed": True, "in_air": True}, "free"),
         ({"battery_percent": 30.0}, "battery"),
         ({"battery_percent": nan}, "battery"),
         ({"position_sigma_m": 9.0}, "position"),

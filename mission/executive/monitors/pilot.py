@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mission.executive.commanded import UNSAID
 from mission.executive.monitors.monitor import monitor
 from mission.executive.snapshot import Snapshot
 
@@ -10,8 +11,6 @@ STICKS = frozenset(
 )
 """Flight modes in which a person's hands move the vehicle, by PX4's names."""
 
-OURS = frozenset(("OFFBOARD", "UNKNOWN", ""))
-
 
 @monitor("pilot_took_over")
 def pilot(snapshot: Snapshot) -> float | None:
@@ -19,13 +18,13 @@ def pilot(snapshot: Snapshot) -> float | None:
     return 1.0 if snapshot.was_ours and snapshot.telemetry.flight_mode in STICKS else -1.0
 
 
-@monitor("vehicle_failsafe", persist_s=2.0, wall=True)
+@monitor("vehicle_failsafe", persist_s=1.5, wall=True)
 def failsafe(snapshot: Snapshot) -> float | None:
-    """Setpoints are being sent, yet the autopilot has been flying something else for two seconds.
+    """The autopilot flies a mode that this program neither commanded nor led to, whether setpoints are sent or not.
 
     The mode is reported up to a second late, and the autopilot itself takes up a stream that broke off for a moment.
     """
-    if not snapshot.streaming:
-        return -1.0
     mode = snapshot.telemetry.flight_mode
-    return -1.0 if mode in OURS or mode in STICKS else 1.0
+    if snapshot.ours is None or mode in snapshot.ours or mode in UNSAID or mode in STICKS:
+        return -1.0
+    return 1.0

@@ -44,7 +44,7 @@ class Flight:
         pose = SimpleNamespace(
             position=position, attitude=np.array([0.0, 0.0, yaw]), velocity=np.zeros(3), gimbal=np.zeros(2)
         )
-        return SimpleNamespace(pose=pose, range_m=self.range_m(position), range_age_s=0.1)
+        return SimpleNamespace(pose=pose, range_m=self.range_m(position), range_age_s=0.1, in_air=True)
 
     def range_m(self, position: np.ndarray) -> float | None:
         if self.tower_is_off_m is None:
@@ -70,7 +70,7 @@ def flight(tower_is_off_m: float | None) -> Flight:
     mission = load(TOWER)
     made = Flight(tower_is_off_m)
     log = SimpleNamespace(info=lambda *words, **values: None)
-    stream: Any = SimpleNamespace(target=None)
+    stream: Any = SimpleNamespace(target=None, streaming=True)
     made.services = Services(
         clock=made, autopilot=made, setpoints=stream, perception=made, turbine=surveyed_turbine(mission),
         mission=mission, raise_event=lambda name, **data: None, log=log,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flight.autopilot import Telemetry, VehiclePose
+from mission.executive.commanded import MODE_OF, Commanded
 from mission.executive.events import EVENTS
 from mission.executive.monitors.monitor import Watch, look, monitors
 from mission.executive.snapshot import Snapshot
@@ -180,15 +181,52 @@ def test_a_mode_chosen_before_take_off_is_no_pilot_taking_over() -> None:
     assert raised("pilot_took_over", replace(sticks, was_ours=False), 5.0)[0] == []
 
 
-def test_the_autopilots_own_modes_are_no_failsafe_while_nothing_is_streamed() -> None:
-    landing = replace(WELL, telemetry=telemetry(flight_mode="LAND"), streaming=False)
-    assert raised("vehicle_failsafe", landing, 5.0)[0] == []
+def commanded(*names: str, reported: bool = True) -> Commanded:
+    made = Commanded()
+    for name in names:
+        made.asks(name)
+        if reported:
+            made.reported(MODE_OF[name])
+    return made
+
+
+@pytest.mark.parametrize(
+    "names, streaming, ours, others",
+    [
+        (("take_off",), False, {"TAKEOFF", "HOLD"}, {"RTL", "LAND", "MISSION", "OFFBOARD"}),
+        (("take_off", "start"), True, {"OFFBOARD"}, {"HOLD", "RTL", "LAND", "TAKEOFF"}),
+        (("take_off", "start"), False, {"OFFBOARD", "HOLD", "LAND"}, {"RTL", "MISSION"}),
+        (("start", "land"), False, {"LAND"}, {"HOLD", "RTL", "MISSION", "OFFBOARD"}),
+        (("start", "hold"), False, {"HOLD"}, {"RTL", "LAND", "OFFBOARD"}),
+    ],
+)
+def test_a_mode_that_nobody_here_commanded_is_somebody_elses(
+    names: tuple[str, ...], streaming: bool, ours: set[str], others: set[str]
+) -> None:
+    modes = commanded(*names).modes(streaming=streaming)
+    for mode in ours | others:
+        snapshot = replace(WELL, telemetry=telemetry(flight_mode=mode), streaming=streaming, ours=modes)
+        assert raised("vehicle_failsafe", snapshot, 5.0)[0] == ([] if mode in ours else ["vehicle_failsafe"]), mode
+
+
+def test_a_command_that_was_not_obeyed_leaves_the_mode_before_it_ours() -> None:
+    asked = commanded("start")
+    asked.asks("land")
+    assert asked.covers("OFFBOARD", streaming=True) and not asked.covers("RTL", streaming=True)
+    asked.reported("LAND")
+    assert not asked.covers("OFFBOARD", streaming=True)
+
+
+def test_before_any_command_no_mode_of_the_autopilots_is_a_failsafe() -> None:
+    ours = commanded().modes(streaming=False)
+    flown = replace(WELL, telemetry=telemetry(flight_mode="MISSION"), streaming=False, ours=ours)
+    assert raised("vehicle_failsafe", flown, 5.0)[0] == []
 
 
 def test_a_handshake_over_a_socket_gets_its_wall_time_however_fast_the_mission_goes() -> None:
     slow = replace(WELL, telemetry=telemetry(flight_mode="HOLD"), speed=8.0)
-    assert raised("vehicle_failsafe", slow, 15.0)[0] == []
-    assert raised("vehicle_failsafe", slow, 17.0)[0] == ["vehicle_failsafe"]
+    assert raised("vehicle_failsafe", slow, 11.0)[0] == []
+    assert raised("vehicle_failsafe", slow, 13.0)[0] == ["vehicle_failsafe"]
 
 
 def test_unknown_values_change_nothing() -> None:
