@@ -91,9 +91,8 @@ class SimulatedRig:
         return float(-camera.fx * step[1] / ahead), float(-camera.fy * step[2] / ahead)
 
     def set_laser(self, on: bool) -> None:
-        """Arm or disarm the laser."""
-        with self._lock:
-            self._laser_armed = on
+        """Arm or disarm the laser, at once: the event loop asks, and must not wait until an image is drawn."""
+        self._laser_armed = on
 
     def close(self) -> None:
         """Nothing to release."""

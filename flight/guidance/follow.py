@@ -32,6 +32,7 @@ Side = Literal["leading", "trailing"]
 Mode = Literal["both", "one", "wrong_side", "none"]
 
 STANDOFF_PID = Pid(p=2.0, i=0.15, d=0.5, limit=1.5, integral_limit=0.4)
+LONGEST_TICK_S = 0.5  # mission; after a blocked loop nothing is made up for at once
 SLOW_M_S = 0.2  # below this the speed is not regulated: the vehicle is to stand
 SPEED_PID = Pid(p=0.0, i=0.25, integral_limit=0.3)
 
@@ -114,7 +115,7 @@ def follow(estimate: BladeEstimate, pose: VehiclePose, settings: FollowSettings,
     Without an edge of the wanted side (mode 'none') it stays at its station and moves gently toward where the edge was
     last known, or toward the wanted side of the blade.
     """
-    elapsed = 0.0 if state.stamp_s is None else max(0.0, pose.stamp_s - state.stamp_s)
+    elapsed = 0.0 if state.stamp_s is None else min(max(0.0, pose.stamp_s - state.stamp_s), LONGEST_TICK_S)
     lens = pose.position + rotation_of(*pose.attitude) @ settings.mount
     normal = estimate.normal
     foot = lens - float((lens - estimate.point) @ normal) * normal

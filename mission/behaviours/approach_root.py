@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from flight.autopilot import Setpoint
+from flight.guidance.follow import LONGEST_TICK_S
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import approach, fly_to
 
@@ -56,7 +57,7 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
     last = services.clock.now()
     carrot = stage.copy()
     async for now in services.ticks():
-        elapsed, last = now - last, now
+        elapsed, last = min(now - last, LONGEST_TICK_S), now
         estimate = services.perception.estimate()
         telemetry = services.autopilot.telemetry
         fresh = estimate is not None and estimate.age_s < FRESH_S and estimate.distance_sigma_m < 0.3

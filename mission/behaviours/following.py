@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from flight.guidance.follow import FollowCommand, FollowSettings, FollowState, View, follow
+from flight.guidance.follow import LONGEST_TICK_S, FollowCommand, FollowSettings, FollowState, View, follow
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -58,7 +58,7 @@ class Following:
         fresh = (STOP_AGE_S - estimate.age_s) / (STOP_AGE_S - FULL_SPEED_AGE_S)
         settings = replace(self.settings, speed_m_s=self.settings.speed_m_s * min(1.0, max(0.0, fresh)))
         command = follow(estimate, self._services.autopilot.telemetry.pose, settings, self._state)
-        elapsed, self._last_s = now - (self._last_s if self._last_s is not None else now), now
+        elapsed, self._last_s = min(now - (self._last_s if self._last_s is not None else now), LONGEST_TICK_S), now
         self._state = command.state
         setpoints = self._services.setpoints
         if setpoints.keep_out is not None:

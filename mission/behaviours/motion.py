@@ -31,8 +31,11 @@ def target_or_here(services: Services) -> Setpoint:
 
 
 def stay(services: Services) -> Setpoint:
-    """Hold the present position and yaw from now on; returns the setpoint."""
-    pose = services.autopilot.telemetry.pose
+    """Hold the present position and yaw from now on, or the last target where they are not known; returns the
+    setpoint."""
+    pose, last = services.autopilot.telemetry.pose, services.setpoints.target
+    if last is not None and not (np.isfinite(pose.position).all() and np.isfinite(pose.attitude[2])):
+        return last
     services.setpoints.target = Setpoint(pose.position.copy(), float(pose.attitude[2]))
     return services.setpoints.target
 

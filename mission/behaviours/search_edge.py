@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from flight.autopilot import Setpoint
+from flight.guidance.follow import LONGEST_TICK_S
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import approach, stay
 
@@ -41,7 +42,7 @@ async def search_edge(services: Services, parameters: SearchEdge) -> str:
         goal, carrot, last = base + outward * offset, here.position.copy(), services.clock.now()
         arrived_s: float | None = None
         async for now in services.ticks():
-            elapsed, last = now - last, now
+            elapsed, last = min(now - last, LONGEST_TICK_S), now
             carrot = approach(carrot, goal, parameters.speed_m_s * elapsed)
             services.setpoints.target = Setpoint(carrot.copy(), here.yaw)
             services.autopilot.point_gimbal(here.yaw, 0.0)

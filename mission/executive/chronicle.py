@@ -94,11 +94,11 @@ class Chronicle:
         """An error of the executive itself."""
         self._line("fault", error=f"{type(error).__name__}: {error}"[:300])
 
-    def ends(self, outcome: str, state: str) -> None:
-        """The last line."""
+    def ends(self, outcome: str, state: str, why: str | None = None) -> None:
+        """The last line. why: what ended the run where no transition did."""
         self.found_out(state)
         lost = {"lost": self.journal.lost} if self.journal.lost else {}
-        self._line("end", outcome=outcome, state=state, **lost)
+        self._line("end", outcome=outcome, state=state, **({} if why is None else {"why": why}), **lost)
 
     def _line(self, kind: str, **fields: Any) -> None:
         self.journal.append(kind, self._clock.now(), **fields)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from mission.executive.journal import Journal
 from mission.executive.machine import Machine
 from mission.executive.question import Ask, Question, Questions
 from mission.executive.queue import EventQueue, Queued
+from mission.executive.silence import Silence
 from mission.executive.snapshot import Snapshot
 from mission.executive.status import Recent
 from mission.executive.timing import Timing, Waiting
@@ -52,6 +54,7 @@ class Conductor:
         ask: Ask | None = None,
         autonomy: Autonomy = "full",
         resume: Configuration | None = None,
+        gone: Callable[[], bool] = lambda: False,
     ) -> None:
         self.mission, self.services, self.autonomy = mission, services, autonomy
         self._clock, self._resumed = clock, resume is not None
@@ -71,6 +74,8 @@ class Conductor:
         self._ignored: set[str] = set()
         self._paused = False
         self._ended: str | None = None
+        self._why: str | None = None
+        self._silence = Silence(gone)
         self._faults = 0
         self._kept_s = 0.0
 
@@ -110,6 +115,10 @@ class Conductor:
     async def _turn(self) -> None:
         """Handle one event, or wait for one until something is due."""
         self._helm.beat()
+        lost = self._silence.lost(asyncio.get_running_loop().time(), self._autopilot.telemetry.link_age_s)
+        if lost is not None:
+            self._give_up(lost)
+            return
         try:
             await self._act_on_time()
             queued = self._queue.pop()
@@ -124,6 +133,12 @@ class Conductor:
         with suppress(TimeoutError):
             async with asyncio.timeout(patience):
                 await self._queue.arrived.wait()
+
+    def _give_up(self, why: str) -> None:
+        """End where no transition can: nothing more is waited for."""
+        if self._ended is None:
+            self.services.log.error("run given up", why=why, state=self.state)
+            self._ended, self._why = "aborted", why
 
     async def _act_on_time(self) -> None:
         """Deadlines cancel the work that they time; transitions whose delay is over are taken if they still can be."""

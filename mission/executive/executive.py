@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -37,7 +38,8 @@ class Executive(Conductor):
     """Flies a mission. `run` returns when the machine is in a final state; no behaviour can end it earlier.
 
     services: put behind a gate, in place, so that an abandoned behaviour cannot steer. ask: how an operator is asked;
-    without it a transition that needs a yes waits for `confirm`. resume: where an interrupted run goes on.
+    without it a transition that needs a yes waits for `confirm`. resume: where an interrupted run goes on. gone:
+    whether the vehicle is known not to exist any more.
     """
 
     def __init__(
@@ -50,8 +52,9 @@ class Executive(Conductor):
         ask: Ask | None = None,
         autonomy: Autonomy = "full",
         resume: Configuration | None = None,
+        gone: Callable[[], bool] = lambda: False,
     ) -> None:
-        super().__init__(mission, services, clock, journal, ask=ask, autonomy=autonomy, resume=resume)
+        super().__init__(mission, services, clock, journal, ask=ask, autonomy=autonomy, resume=resume, gone=gone)
         self.interrupted = False
         self._loop: asyncio.AbstractEventLoop | None = None
         journal.on_lost = self._journal_lost
@@ -60,6 +63,7 @@ class Executive(Conductor):
         """Fly until a final state is reached."""
         self._loop = asyncio.get_running_loop()
         watching = self._loop.create_task(self._watcher.run(self._clock), name="monitors")
+        watching.add_done_callback(self._monitors_ended)
         configuration = self._machine.configuration
         try:
             self._chronicle.begins(configuration, autonomy=self.autonomy, resumed=self._resumed)
@@ -73,15 +77,15 @@ class Executive(Conductor):
                 await self._fault(error)
             while self._ended is None:
                 await self._turn()
+            await self._work.stop(self._helm.beat)
             await self._helm.leave()
-            self._chronicle.ends(self._ended, self.state)
+            self._chronicle.ends(self._ended, self.state, self._why)
             await self._helm.patiently(self._chronicle.journal.durable())
             return Outcome(self._ended, self.state, self.interrupted)
         finally:
             self._questions.close()
             watching.cancel()
-            with suppress(asyncio.CancelledError):
-                await watching
+            await asyncio.gather(watching, return_exceptions=True)
 
     def raise_event_threadsafe(self, name: str, **data: Any) -> None:
         """The same from any thread."""
@@ -94,6 +98,12 @@ class Executive(Conductor):
         """Ctrl-C, SIGTERM: run the abort path, and say so in the outcome."""
         self.interrupted = True
         self._queue.put("interrupted", {"by": by} if by else {})
+
+    def end_now(self, by: str = "") -> None:
+        """Told to stop once more while interrupted: end without waiting for the abort path."""
+        self.interrupted = True
+        self.note("end_now", by)
+        self._give_up("told to stop a second time")
 
     def skip(self, path: str) -> tuple[bool, str]:
         """Go to a state that the mission marks as an entry; returns whether, and the words for the operator."""
@@ -135,6 +145,12 @@ class Executive(Conductor):
             text=progress.text,
             station_m=progress.station_m,
         )
+
+    def _monitors_ended(self, task: asyncio.Task[None]) -> None:
+        """Nobody watches the limits any more."""
+        if not task.cancelled():
+            self.services.log.error("monitors ended", exc_info=task.exception())
+            self.raise_event("abort", error="the monitors ended")
 
     def _journal_lost(self, text: str) -> None:
         self.services.log.error("journal lost", text=text)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+import structlog
 
 from devices.rig import CaptureError, Rig
 from flight.autopilot import Autopilot, VehiclePose
@@ -72,6 +74,7 @@ class VisionLoop:
         mount: tuple[float, float, float],
         sink: CycleSink,
         pace: Pace | None = None,
+        log: Any = None,
         rate_hz: float = 5.0,
         latency_s: float = 0.0,
     ) -> None:
@@ -82,6 +85,8 @@ class VisionLoop:
         self._mount = np.array(mount)
         self._period_s = 1.0 / rate_hz
         self._latency_s = latency_s
+        self._log = structlog.get_logger() if log is None else log
+        self._failure: str | None = None
         self._watching = False
         self._side: str | None = None
         self._cycle = asyncio.Condition()
@@ -172,7 +177,7 @@ class VisionLoop:
         self._side = side
 
     async def run(self) -> None:
-        """Cycle for ever; cancelled at the end of the run."""
+        """Cycle for ever; cancelled at the end of the run. A cycle that fails is a gap, never the end."""
         due = self._clock.now()
         while True:
             now = self._clock.now()
@@ -181,10 +186,24 @@ class VisionLoop:
                 async with self._busy:
                     if self._pace is not None:
                         self._pace.begin()
-                    await self._one_cycle()
+                    try:
+                        await self._one_cycle()
+                    except Exception as error:
+                        self._failed(error)
+                    else:
+                        self._failure = None
                     if self._pace is not None:
                         self._pace.end()
             await self._clock.sleep(max(due - self._clock.now(), 0.002))
+
+    def _failed(self, error: Exception) -> None:
+        """What goes on failing in the same way is told to the log once, and to the record each time."""
+        reason = f"{type(error).__name__}: {error}".splitlines()[0][:200]
+        if reason != self._failure:
+            self._failure = reason
+            self._log.error("vision cycle failed", error=reason, exc_info=error)
+        with suppress(Exception):  # the record itself may be what fails
+            self._sink.gap(self._clock.now(), reason)
 
     async def _one_cycle(self) -> None:
         side = self._side

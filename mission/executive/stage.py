@@ -43,7 +43,7 @@ class FlightError(RuntimeError):
 class Stage:
     """One flight's surroundings. world: None without a simulated one. switch: faults of the simulated vehicle.
     check: what is looked at once the vehicle is connected; raises FlightError. parameters: what the autopilot is given
-    before it is armed."""
+    before it is armed. gone: whether the vehicle is known not to exist any more, as when its process has ended."""
 
     loop_factory: Callable[[], asyncio.AbstractEventLoop]
     clock: Clock
@@ -54,6 +54,7 @@ class Stage:
     pace: Pace | None = None
     check: Callable[[], Awaitable[None]] | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    gone: Callable[[], bool] = lambda: False
 
 
 @contextmanager
@@ -119,11 +120,13 @@ def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
             raise FlightError(str(error)) from error
         stack.callback(rig.close)
         pace = None
-        if switch is not None:
+        if vehicle is not None:
+            from devices.vehicle.truth_channel import TruthClient
             from mission.executive.pace import Pace
 
-            throw = switch
-            pace = Pace(clock, speed, lambda faster: throw("speed", speed=faster))
+            hurry = TruthClient(vehicle.truth_port)  # of its own: vision waits for answers on the other
+            stack.callback(hurry.close)
+            pace = Pace(clock, speed, lambda faster: hurry.tell("speed", speed=faster))
 
         async def same_time() -> None:
             complaint = None if vehicle is not None else await speed_mismatch(autopilot, speed, system)
@@ -132,7 +135,16 @@ def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
 
         parameters = parameters_at(rig_file.parameters, speed) if simulated else {}  # a real one's are its owner's
         yield Stage(
-            asyncio.new_event_loop, clock, autopilot, rig, world, switch, pace, check=same_time, parameters=parameters
+            asyncio.new_event_loop,
+            clock,
+            autopilot,
+            rig,
+            world,
+            switch,
+            pace,
+            check=same_time,
+            parameters=parameters,
+            gone=lambda: vehicle is not None and not vehicle.alive,
         )
 
 

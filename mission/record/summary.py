@@ -60,9 +60,12 @@ def summarise(history: RunHistory) -> Mapping[str, Any]:
 
 
 def _why(history: RunHistory) -> str | None:
-    """The event that first led out of the inspection and what was said with it; None for a completed run."""
+    """What ended a run that did not reach a final state, else the event that first led out of the inspection and what
+    was said with it; None for a completed run."""
     if (history.end or {}).get("outcome") == "completed":
         return None
+    if (history.end or {}).get("why"):
+        return str((history.end or {})["why"])
     said: Mapping[str, Any] = {}
     for line in history.journal:
         if line["kind"] == "event":

@@ -129,6 +129,7 @@ class Flight:
     at: Sequence[tuple[float, Callable[[Executive], Any]]] = ()
     patience_s: float = 600.0
     resume: Any = None
+    gone: bool = False
     executive: Executive = field(init=False)
 
     @property
@@ -177,6 +178,7 @@ class Flight:
             ask=self.ask,
             autonomy=self.autonomy,  # type: ignore[arg-type]
             resume=self.resume,
+            gone=lambda: self.gone,
         )
         self.services.raise_event = self.executive.raise_event
 
