@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 PULSE_S = 0.1  # of the event loop: the executive shows at least this often that it is alive
 STALLED_S = 0.8  # of the event loop: after such a gap the autopilot may have left OFFBOARD
 _LAST_HOLD_S = 5.0
+_COMING_DOWN = ("LAND", "RTL")
 
 
 class Helm:
@@ -70,11 +71,12 @@ class Helm:
         self._log.warning("let go of the vehicle")
 
     async def leave(self) -> None:
-        """At the end: a vehicle that is still in the air, and ours, is left in the autopilot's own hold."""
+        """At the end: a vehicle that is still in the air, and ours, is left in the autopilot's own hold, or landing."""
         if self._gate.let_go:
             return
         ours = self._commanded.took_over or self._setpoints.target is not None
         with suppress(Exception):
-            if ours and self._autopilot.telemetry.in_air:
+            telemetry = self._autopilot.telemetry
+            if ours and telemetry.in_air and telemetry.flight_mode not in _COMING_DOWN:
                 await self.patiently(asyncio.wait_for(self._autopilot.hold(), _LAST_HOLD_S))
         self._setpoints.stop()

@@ -103,3 +103,11 @@ def test_a_second_signal_ends_the_run_at_once_and_leaves_the_vehicle_holding(fly
     assert flight.autopilot.commands == ["hold"]
     kind, end = flight.journal[-1]
     assert kind == "end" and "second time" in end["why"]
+
+
+def test_a_vehicle_that_lands_already_is_left_to_land(fly: Any) -> None:
+    flight = fly(FOR_EVER)
+    flight.autopilot.says(flight_mode="LAND")
+    flight.at = [(2.0, lambda executive: executive.end_now("SIGINT"))]
+    assert flight.run().outcome == "aborted"
+    assert flight.autopilot.commands == []
