@@ -19,6 +19,7 @@ class Reposition(Parameters):
     standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to hold meanwhile")
     steady_s: float = Field(1.0, gt=0, le=10, description="how long the new edge must be held in view")
 
+
 BRIDGE_S = 6.0  # an edge before a tower comes and goes: so long it may be carried by the tracker,
 SURE_M = 0.15  # while it is known as well as this
 
