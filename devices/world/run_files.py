@@ -5,8 +5,6 @@ the mission's telemetry on the executive's clock: laid over each other they tell
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +14,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from devices.torn_files import csv_rows, json_lines
 from devices.world.settings import WorldSettings
 from devices.world.truth import SHARP, Flight, Pass, Photograph
 from devices.world.turbine import TurbineShape
@@ -44,15 +43,15 @@ class RunFiles:
             document = yaml.load((folder / "mission.yaml").read_text("utf-8"), Loader=yaml.CSafeLoader)
         except (OSError, yaml.YAMLError):
             return None
-        rows = _rows(folder / "telemetry" / "truth.csv")
+        rows = csv_rows(folder / "telemetry" / "truth.csv")
         if len(rows) < 2 or not isinstance(document, dict) or "turbine" not in document or "rig" not in document:
             return None
         settings = WorldSettings.model_validate(document.get("world") or {})
         shape = TurbineShape.of(document["turbine"], document["site"], settings.survey_error)
-        reported = _rows(folder / "telemetry" / "telemetry.csv")
+        reported = csv_rows(folder / "telemetry" / "telemetry.csv")
         flight = _flight(rows, _clock_offset(rows, reported))
         follows = dict(_follows(document.get("states") or {}, ""))
-        journal = list(_lines(folder / "journal.jsonl"))
+        journal = list(json_lines(folder / "journal.jsonl"))
         wanted = [state.get("standoff_m") for state in follows.values()]
         standoff = [float(value) for value in wanted if isinstance(value, int | float)]
         return cls(
@@ -63,7 +62,7 @@ class RunFiles:
             tuple(_passes(journal, follows, float(flight.t[-1]))),
             tuple(
                 Photograph(float(line["stamp_s"]), str(line["side"]))
-                for line in _lines(folder / "frames" / "frames.jsonl")
+                for line in json_lines(folder / "frames" / "frames.jsonl")
                 if line.get("accepted") and (line.get("sharpness") or 0.0) >= SHARP
             ),
             standoff[0] if standoff else None,
@@ -75,30 +74,6 @@ def _claimed_tip(journal: list[Mapping[str, Any]]) -> float | None:
     """The tip's distance from the hub as last remembered, on a line of its own or beside a transition."""
     remembered = (line.get("memory") or line for line in reversed(journal))
     return next((float(one["tip_station_m"]) for one in remembered if one.get("tip_station_m") is not None), None)
-
-
-def _rows(path: Path) -> list[Mapping[str, str]]:
-    """Rows of a CSV file, a torn last one left out."""
-    try:
-        with path.open(encoding="utf-8", errors="replace", newline="") as file:
-            return [row for row in csv.DictReader(file) if None not in row.values() and None not in row]
-    except OSError:
-        return []
-
-
-def _lines(path: Path) -> Iterator[Mapping[str, Any]]:
-    """Objects of a JSON-lines file, torn lines left out."""
-    try:
-        text = path.read_text("utf-8", errors="replace")
-    except OSError:
-        return
-    for line in text.splitlines():
-        try:
-            fields = json.loads(line)
-        except ValueError:
-            continue
-        if isinstance(fields, dict):
-            yield fields
 
 
 def _columns(rows: list[Mapping[str, str]], *names: str) -> Array:

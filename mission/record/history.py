@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import yaml
 
+from devices.torn_files import csv_rows, json_lines
 from mission.record.folder import RunFolder
 
 Line = Mapping[str, Any]
@@ -144,27 +142,3 @@ def _states(states: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         if isinstance(state, dict):
             yield state
             yield from _states(state.get("states") or {})
-
-
-def json_lines(path: Path) -> Iterator[Line]:
-    """Objects of a JSON-lines file; a line that is torn or no object is left out."""
-    try:
-        text = path.read_text("utf-8", errors="replace")
-    except OSError:
-        return
-    for line in text.splitlines():
-        try:
-            fields = json.loads(line)
-        except ValueError:
-            continue
-        if isinstance(fields, dict):
-            yield fields
-
-
-def csv_rows(path: Path) -> Sequence[Mapping[str, str]]:
-    """Rows of a CSV file; a torn last row is left out."""
-    try:
-        with path.open(encoding="utf-8", errors="replace", newline="") as file:
-            return [row for row in csv.DictReader(file) if None not in row.values() and None not in row]
-    except OSError:
-        return []

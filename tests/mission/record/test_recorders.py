@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from devices.torn_files import csv_rows
 from mission.record.folder import create
 from mission.record.frames import QUEUE, FrameRecorder
-from mission.record.history import csv_rows
 from mission.record.row_file import RowFile
 from mission.record.telemetry import TelemetryRecorder
 from tests.mission.record.synthetic_run import CAMERA, MISSION, estimate, flown, fly, images, telemetry
