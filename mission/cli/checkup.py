@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from vision.camera import RigGeometry
 
 CONNECT_S = 8.0
-CORE = ("transitions", "mavsdk", "opencv-python-headless", "numpy", "filterpy", "pydantic", "structlog")
-SIMULATOR = ("numba", "pymavlink")
+CORE = ("transitions", "mavsdk", "opencv-python-headless", "numpy", "filterpy", "numba", "pydantic", "structlog")
+SIMULATOR = ("pymavlink",)
 
 
 class Level(StrEnum):

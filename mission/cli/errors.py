@@ -26,7 +26,7 @@ EXPECTED = (
 """Errors that a person can do something about, and their exit codes. Their modules are not imported for this: an error
 whose class was never loaded cannot have been raised."""
 
-OPTIONAL = {"numba": "sim", "llvmlite": "sim", "pymavlink": "sim", "matplotlib": "dev"}
+OPTIONAL = {"pymavlink": "sim", "matplotlib": "dev"}
 """Packages that come with an extra of this project."""
 
 

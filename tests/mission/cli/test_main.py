@@ -141,7 +141,7 @@ def test_other_ends_have_their_codes(raised: BaseException, code: int) -> None:
 
 
 def test_a_missing_extra_names_the_command_that_installs_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert errors.explain(ModuleNotFoundError("No module named 'numba'", name="numba")) == 2
+    assert errors.explain(ModuleNotFoundError("No module named 'pymavlink'", name="pymavlink")) == 2
     assert "pip install 'blade-mission[sim]'" in capsys.readouterr().err
 
 
