@@ -6,7 +6,6 @@ stands before another point than the hub's centre.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import cv2
@@ -19,6 +18,7 @@ from vision.observation import FarView
 from vision.rotor_fit import Fit, Picture, fit_rotor, settled, start_of
 from vision.rotor_model import surprise
 from vision.rotor_search import guesses
+from vision.stopwatch import Now, Stopwatch
 
 Array = NDArray[np.float64]
 
@@ -40,13 +40,13 @@ class Expected:
     sigma_px: float
 
 
-def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -> FarView:
+def find_rotor(image: Image, camera: Camera, expected: Expected | None = None, now: Now | None = None) -> FarView:
     """Hub and blades in a picture (h, w, 3) BGR or (h, w) grey taken from 30 to 80 m before the rotor.
 
     camera: of this picture; with another size the view is refused. Directions and hub are in the image frame as the
-    lens draws it, px of the full image.
+    lens draws it, px of the full image. now: the clock that `elapsed_ms` is told by.
     """
-    started = time.perf_counter()
+    watch = Stopwatch(now)
     if image.shape[:2] != (camera.height, camera.width):
         size = f"{image.shape[1]} x {image.shape[0]}"
         return FarView(False, (f"the picture is {size} px, the camera {camera.width} x {camera.height}",))
@@ -60,7 +60,8 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None) -
     near, within = (expected.hub / factor, 4 * expected.sigma_px / factor) if expected is not None else (None, np.inf)
     settled_on = _settled(picture, [start_of(guess) for guess in guesses(picture.planes, near, within)])
     fits = [fit_rotor(picture, *found) for found in settled_on[:MOST_FITS]]
-    elapsed = {"far_view": (time.perf_counter() - started) * 1e3}
+    watch.lap("far_view")
+    elapsed = watch.elapsed_ms
     if not fits:
         return FarView(False, ("no three equal blades around a hub",), elapsed_ms=elapsed)
     order = sorted(fits, key=lambda fit: -_merit(fit))

@@ -20,7 +20,7 @@ from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import green, reduce_image, reduction_factor, to_full, tones
 from vision.single import observe_photograph
-from vision.stopwatch import Stopwatch
+from vision.stopwatch import Now, Stopwatch
 from vision.surface import Surface, fit_surface
 from vision.tip import tip_of
 
@@ -35,11 +35,12 @@ class Eye:
     """Observes blades with one rig. Holds no state between frames and may be shared by threads.
 
     Dots, points and edges all belong to the instant of the laser-on images; the laser-off images only tell the dots
-    apart.
+    apart. now: the clock that `elapsed_ms` of an observation is told by; without one it is empty.
     """
 
-    def __init__(self, geometry: RigGeometry) -> None:
+    def __init__(self, geometry: RigGeometry, now: Now | None = None) -> None:
         self.geometry = geometry
+        self._now = now
         self.factor = reduction_factor(geometry.stereo.left.width)
         self._stereo = geometry.stereo.shrunk(self.factor)
         self._reachable: tuple[Image, Image] | tuple[None, None] = (None, None)
@@ -55,7 +56,7 @@ class Eye:
 
         expected: direction of the blade's axis in the left image, rad modulo π, where tracker or survey know it.
         """
-        watch = Stopwatch()
+        watch = Stopwatch(self._now)
         missing = [name for name in ("left", "left_laser") if getattr(frames, name) is None]
         if missing:
             return self._refused(frames, watch, f"no {' and no '.join(missing)} image")
@@ -232,9 +233,10 @@ class Eye:
         return replace(BladeObservation(frames.stamp_s, False, reasons), elapsed_ms=watch.elapsed_ms)
 
 
-def observe_single(image: Image, geometry: RigGeometry | None = None) -> BladeObservation:
+def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now | None = None) -> BladeObservation:
     """Dots, edges and tip of one laser-on photograph (h, w) or (h, w, 3), in its own pixels. There is no distance in
-    it: the rig's geometry is accepted so that a caller need not ask, and checked against the image's size."""
+    it: the rig's geometry is accepted so that a caller need not ask, and checked against the image's size. now: as for
+    the Eye."""
     if geometry is not None:
         camera = geometry.stereo.left
         if image.shape[:2] != (camera.height, camera.width):
@@ -242,7 +244,7 @@ def observe_single(image: Image, geometry: RigGeometry | None = None) -> BladeOb
                 f"image is {image.shape[1]} × {image.shape[0]} pixels, "
                 f"the rig's camera {camera.width} × {camera.height}"
             )
-    return observe_photograph(image)
+    return observe_photograph(image, now=now)
 
 
 def _blade_of(matches: Matches) -> Matches:

@@ -17,7 +17,7 @@ from vision.lines import sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import green, reduce_image, reduction_factor, tones
-from vision.stopwatch import Stopwatch
+from vision.stopwatch import Now, Stopwatch
 from vision.tip import tip_of
 
 Array = NDArray[Any]  # of floats
@@ -27,10 +27,10 @@ LEAST_DOTS = 6
 TALLEST, WIDEST = 26, 46  # px: the laser stands beside the camera, so its dots are smeared along the rows
 
 
-def observe_photograph(image: Image, stamp_s: float = 0.0) -> BladeObservation:
+def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = None) -> BladeObservation:
     """Dots, edges and tip of a laser-on photograph (h, w) or (h, w, 3); pixels of this image. `valid` means that
-    edges were found; distance, points and matches stay None."""
-    watch = Stopwatch()
+    edges were found; distance, points and matches stay None. now: the clock that `elapsed_ms` is told by."""
+    watch = Stopwatch(now)
     width = image.shape[1]
     factor = reduction_factor(width)
     scale = 1.0 / factor

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -100,10 +101,10 @@ def _observed(images: Path, loaded: dict[str, Image], geometry: RigGeometry | No
 
     try:
         if geometry is None or "left" not in loaded:
-            return observe_single(loaded["left_laser"], geometry)
+            return observe_single(loaded["left_laser"], geometry, perf_counter)
         left, right, left_laser, right_laser = (loaded.get(name) for name in NAMES)
         frames = StereoFrames(0.0, left, right, left_laser, right_laser)
-        return Eye(geometry).observe(frames)
+        return Eye(geometry, perf_counter).observe(frames)
     except ValueError as error:
         raise CommandError(f"{images}: {error}") from None
 

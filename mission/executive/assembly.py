@@ -181,8 +181,8 @@ def _compose(
     )
     perception = VisionLoop(
         rig=stage.rig,
-        eye=Eye(stage.rig.geometry),
-        find_rotor=lambda image: find_rotor(image, camera),
+        eye=Eye(stage.rig.geometry, time.perf_counter),
+        find_rotor=lambda image: find_rotor(image, camera, now=time.perf_counter),
         tracker=lambda frame: BladeTracker(frame, camera),
         frame=turbine.blade_frame(),
         autopilot=stage.autopilot,

@@ -58,7 +58,7 @@ def table(scenes: int = 8, repeats: int = 5) -> list[str]:
         laps: dict[str, list[float]] = {stage: [] for stage in STAGES}
         for seed in range(scenes if scale == 1 else min(scenes, 3)):
             scene = draw_scene(random_settings(9000 + seed, colour=colour, scale=scale))
-            eye = Eye(scene.geometry)
+            eye = Eye(scene.geometry, time.perf_counter)
             eye.observe(scene.frames)
             for _ in range(repeats):
                 elapsed = eye.observe(scene.frames).elapsed_ms
