@@ -27,7 +27,7 @@ from vision.capture import CameraPose
 from vision.estimate import BladeEstimate, BladeFrame
 from vision.observation import BladeObservation, Edge
 
-__all__ = ["BladeTracker", "TrackerSettings", "UpdateResult", "lost"]
+__all__ = ["BladeTracker", "Kept", "TrackerSettings", "UpdateResult", "lost"]
 
 Array = NDArray[np.float64]
 STEP_M = 0.1  # the reference follows the view in steps, so that a trembling camera adds no travel
@@ -47,6 +47,15 @@ class UpdateResult:
     reasons: tuple[str, ...] = ()
     part_nis: Mapping[str, float] = field(default_factory=dict)
     refused_m: Mapping[Side, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a tracker knows at one moment. stamp_s: of the last observation; seen_s: when each part was last seen."""
+
+    model: BladeModel
+    stamp_s: float
+    seen_s: Mapping[str, float]
 
 
 class BladeTracker:
@@ -72,6 +81,15 @@ class BladeTracker:
         self._seen_s: dict[str, float] = {}
         self._challenger_seen_s: dict[str, float] = {}
         self._refused: dict[Side, list[float]] = {side: [] for side in SIDES}
+
+    def kept(self) -> Kept | None:
+        """What is known now, for another tracker to go on from; None before the blade is confirmed."""
+        return None if self._model is None else Kept(self._model, self._stamp_s, dict(self._seen_s))
+
+    def go_on_from(self, kept: Kept) -> None:
+        """Forget, and know what another tracker of the same frame knew; it drifts and ages from its own stamps on."""
+        self.forget()
+        self._model, self._stamp_s, self._seen_s = kept.model, kept.stamp_s, dict(kept.seen_s)
 
     def forget_side(self, side: Side) -> None:
         """Drop one edge: it is as unknown as before it was first seen."""
