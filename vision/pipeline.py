@@ -70,9 +70,7 @@ class Eye:
         both = "right" in images and "right_laser" in images
         left = find_spots(green(images["left"]), green(images["left_laser"]), self._reachable[0])
         right = (
-            find_spots(green(images["right"]), green(images["right_laser"]), self._reachable[1], left.motion)
-            if both
-            else None
+            find_spots(green(images["right"]), green(images["right_laser"]), self._reachable[1], left) if both else None
         )
         watch.lap("dots")
         laser = self.geometry.laser
