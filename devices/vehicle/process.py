@@ -8,11 +8,13 @@ import os
 import select
 import signal
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from devices.vehicle.fault_switches import FaultSwitches
+from devices.vehicle.keeper import Keeper
 from devices.vehicle.mavlink_face import MavlinkFace
 from devices.vehicle.settings import ProcessSettings, Surroundings
 from devices.vehicle.truth_channel import answer
@@ -23,7 +25,6 @@ from devices.vehicle.vehicle import ForwardRange, SimulatedVehicle, TruePose, Ve
 _WAKE_S = 0.005
 _CHUNK_S = 0.004
 _LAG_MAX_S = 0.4
-_PARENT_CHECK_S = 0.5
 
 
 class VehicleServer:
@@ -53,9 +54,8 @@ class VehicleServer:
         self._origin_s = time.monotonic()
         self._left_out_s = 0.0
         self._stopping: str | None = None
-        self._parent = os.getppid()
-        self._parent_checked_s = self._origin_s
-        self._orphaned_s: float | None = None
+        parent = settings.parent_pid or os.getppid()
+        self._keeper = Keeper(parent if settings.watch_parent else None, settings.orphan_s)
 
     @property
     def ports(self) -> dict[str, Any]:
@@ -167,27 +167,40 @@ class VehicleServer:
                 self.stop("asked to")
             elif name == "speed":
                 self.change_speed(float(request["speed"]))
+            elif name == "adopt":
+                reply |= self._adopted(**request)
             else:
                 self._switches.run(name, request)
-        except ValueError as error:
+        except (ValueError, TypeError, OSError) as error:
             reply["error"] = str(error)
         self._answered[self._asking] = reply
         return reply
 
+    def _adopted(self, token: str, pid: int, speed: float, folder: str) -> dict[str, Any]:
+        """Another program takes the vehicle up, if the one before is gone."""
+        if not token or token != self._settings.token:
+            raise ValueError("it is another vehicle")
+        if self._keeper.kept:
+            return {"kept": True}
+        log = TruthLog(Path(folder), self.vehicle, wall=True)
+        self._keeper.hand_over(pid)
+        self.change_speed(speed)
+        self._note("adopted")
+        if self._log is not None:
+            self._log.close()
+        self._log = log
+        return {"kept": False, "pid": os.getpid()}
+
     def _watch_parent(self) -> None:
-        now = time.monotonic()
-        if not self._settings.watch_parent or now - self._parent_checked_s < _PARENT_CHECK_S:
-            return
-        self._parent_checked_s = now
-        if self._orphaned_s is None and os.getppid() != self._parent:
-            self._orphaned_s = now
-            if self._log is not None:
-                self._log.event(VehicleEvent(self.vehicle.time_s, "parent_died", {}))
-        if self._orphaned_s is not None:
-            if not self.vehicle.firmware.armed and now - self._orphaned_s > 2.0:
-                self.stop("landed without a parent")
-            elif now - self._orphaned_s > self._settings.orphan_s:
-                self.stop("without a parent for too long")
+        died, enough = self._keeper.look(time.monotonic(), self.vehicle.firmware.armed)
+        if died:
+            self._note("parent_died")
+        if enough is not None:
+            self.stop(enough)
+
+    def _note(self, kind: str) -> None:
+        if self._log is not None:
+            self._log.event(VehicleEvent(self.vehicle.time_s, kind, {}))
 
 
 def range_finder(surroundings: Surroundings) -> ForwardRange:

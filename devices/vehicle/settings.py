@@ -66,8 +66,9 @@ class Surroundings(_Section):
 class ProcessSettings(_Section):
     """A vehicle in its own process.
 
-    folder: where truth.csv and vehicle_events.jsonl go, None for no record. watch_parent: when the process that started
-    it dies, fly on until landed or `orphan_s` wall seconds have passed, then exit. world: None for an empty sky.
+    folder: where truth.csv and vehicle_events.jsonl go, None for no record. watch_parent: when the process `parent_pid`
+    (None: the one that started it) dies, fly on for `orphan_s` wall seconds, or until landed for a while, then exit,
+    unless another takes the vehicle up with `token`. world: None for an empty sky.
     """
 
     vehicle: VehicleSettings = Field(default_factory=VehicleSettings)
@@ -77,5 +78,7 @@ class ProcessSettings(_Section):
     truth_port: int = Field(0, ge=0, le=65535)
     folder: Path | None = None
     watch_parent: bool = False
-    orphan_s: float = Field(20.0, ge=0)
+    parent_pid: int | None = None
+    orphan_s: float = Field(120.0, ge=0)
+    token: str = ""
     world: Surroundings | None = None

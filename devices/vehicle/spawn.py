@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import queue
+import secrets
 import subprocess
 import sys
 import tempfile
@@ -13,6 +14,7 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
+from devices.vehicle.handover import VehicleNote
 from devices.vehicle.settings import ProcessSettings
 
 START_S = 30.0
@@ -25,12 +27,19 @@ class SpawnError(RuntimeError):
 
 @dataclass(frozen=True)
 class VehicleProcess:
-    """A running vehicle. link_ports: where each of its links listens. `system_address` is what MAVSDK connects to."""
+    """A running vehicle. link_ports: where each of its links listens. `system_address` is what MAVSDK connects to.
+    token: with which another program may take it up once this one is gone."""
 
     process: subprocess.Popen[str]
     link_ports: tuple[int, ...]
     truth_port: int
     system_address: str
+    token: str = ""
+
+    @property
+    def note(self) -> VehicleNote:
+        """What another program needs to take it up."""
+        return VehicleNote(truth_port=self.truth_port, system_address=self.system_address, token=self.token)
 
     @property
     def alive(self) -> bool:
@@ -60,6 +69,7 @@ def spawn(settings: ProcessSettings) -> VehicleProcess:
     Raises:
         SpawnError: it said why it cannot start, or said nothing for half a minute.
     """
+    settings = settings.model_copy(update={"parent_pid": os.getpid(), "token": settings.token or secrets.token_hex(16)})
     with tempfile.TemporaryFile("w+") as complaints:
         process = subprocess.Popen(
             [sys.executable, "-m", "devices.vehicle", "--config", "-"],
@@ -85,7 +95,7 @@ def spawn(settings: ProcessSettings) -> VehicleProcess:
         address = f"udpout://127.0.0.1:{ports[0]}"
     else:
         address = f"udpin://{first.remote_host}:{first.remote_port}"
-    return VehicleProcess(process, ports, said["truth_port"], address)
+    return VehicleProcess(process, ports, said["truth_port"], address, settings.token)
 
 
 def _first_line(process: subprocess.Popen[str], configuration: str) -> str:

@@ -34,7 +34,7 @@ class TruthLog:
         self._vehicle = vehicle
         self._wall = wall
         self._next_s = 0.0
-        self._events_seen = 0
+        self._events_seen = len(vehicle.events)  # what was before is in the record of who had it then
         self._rows: IO[str] = (folder / TRUTH_FILE).open("w", encoding="utf-8")
         self._events: IO[str] = (folder / EVENTS_FILE).open("w", encoding="utf-8")
         self._rows.write(",".join(COLUMNS) + "\n")
