@@ -13,7 +13,7 @@ from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import approach, fly_to
 
 if TYPE_CHECKING:
-    from mission.executive.services import Services
+    from mission.executive.services import Memory, Services
     from vision.estimate import BladeEstimate
 
 
@@ -27,6 +27,9 @@ class ApproachRoot(Parameters):
     creep_m_s: float = Field(0.6, gt=0, le=1.5, description="speed from there on")
 
 
+OVERLAP_M = 1.5  # of a pass that goes on with what was flown of it before
+TIP_MARGIN_M = 1.5  # so far inside the tip there is still enough blade to be found
+INSIDE_M = 0.5  # from the edge, so that there is a surface to measure
 FRESH_S = 1.0  # an older estimate does not lead any nearer
 SEEN_S = 1.0  # the blade must have been tracked without a break for so long before the approach relies on it
 
@@ -39,13 +42,17 @@ SEEN_S = 1.0  # the blade must have been tracked without a break for so long bef
 async def approach_root(services: Services, parameters: ApproachRoot) -> str:
     """Fly in front of the blade's root, then creep toward it until the blade is seen, measured and three metres away.
 
+    In front of where the inspection goes on, where it was interrupted before: a little before the end of the pass that
+    was begun, or at the tip after the pass that led there.
+
     Until the cameras measure the blade, the range finder limits how near the vehicle goes.
     """
     turbine = services.turbine
     frame = turbine.blade_frame()
     ahead = turbine.axes()[0] * np.array([1.0, 1.0, 0.0])
     ahead /= np.linalg.norm(ahead)
-    root = frame.to_ned(np.array([parameters.station_m, 0.0, 0.0]))
+    station, offset = goes_on_at(services.memory, parameters.station_m, turbine.tip_radius_m)
+    root = frame.to_ned(np.array([station, offset, 0.0]))
     yaw = float(np.arctan2(ahead[1], ahead[0]))
     stage = root - ahead * (parameters.stage_m + 1.0)
     services.progress.text = "to the staging point"
@@ -85,6 +92,20 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
                 return "not_found"
         services.setpoints.target = Setpoint(carrot.copy(), yaw)
     raise AssertionError("ticks never end")
+
+
+def goes_on_at(memory: Memory, root_m: float, tip_m: float) -> tuple[float, float]:
+    """Station and offset (m, blade frame) at which the inspection goes on; at the root where it has yet to begin."""
+    begun = [side for side in memory.inspected if side not in memory.passes_done]
+    done = [side for side in memory.inspected if side in memory.passes_done]
+    if not begun and (not done or len(done) > 1):
+        return root_m, 0.0
+    side = (begun or done)[-1]
+    stretch = memory.inspected[side]
+    travel = float(np.sign(stretch.to_m - stretch.from_m))
+    station = stretch.to_m - (OVERLAP_M * travel if begun else 0.0)
+    inward = -INSIDE_M if side == "leading" else INSIDE_M
+    return float(np.clip(station, root_m, max(root_m, tip_m - TIP_MARGIN_M))), stretch.edge_m + inward
 
 
 def _excess(estimate: BladeEstimate, range_m: float | None, standoff_m: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 class ConfirmTip(Parameters):
     """Parameters of `confirm_tip`."""
 
+    side: Literal["leading", "trailing"] = Field("leading", description="the pass that ended here; goes on if rejected")
     sightings: int = Field(5, ge=2, le=30, description="agreeing sightings that are wanted")
     spread_m: float = Field(0.4, gt=0, le=2, description="how far they may lie from their median")
     length_error_m: float = Field(3.0, gt=0, description="how far from the turbine file's blade length the tip may lie")
@@ -43,7 +44,9 @@ async def confirm_tip(services: Services, parameters: ConfirmTip) -> str:
         services.progress.text = f"tip at {station:.2f} m, expected {expected:.1f} m"
         services.log.info("tip", station_m=round(station, 3), expected_m=expected)
         if abs(station - expected) > parameters.length_error_m:
-            return "rejected"
+            break
         services.memory.tip_station_m = station
         return "confirmed"
+    services.memory.tip_station_m = None
+    services.memory.passes_done[:] = [side for side in services.memory.passes_done if side != parameters.side]
     return "rejected"

@@ -8,10 +8,11 @@ import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
+from mission.executive.services import Stretch
 from vision.landmarks import RootWatch, agreed_tip
 
 if TYPE_CHECKING:
-    from mission.executive.services import Services
+    from mission.executive.services import Memory, Services
     from vision.estimate import BladeEstimate
 
 
@@ -30,6 +31,7 @@ TIP_WINDOW_S = 2.0
 TIP_WITHIN_M = 4.0  # of where the turbine file has it: what looks like a tip elsewhere is dirt or another blade
 PAST_TIP_M = 1.5  # beyond the expected tip nothing is followed
 ROOT_MARGIN_M = 4.0  # the root's beginning is expected inside the root radius plus this
+PROGRESS_STEP_M = 0.5
 NEAREST_ROOT_M = 2.6  # never nearer to the hub's centre than this
 
 
@@ -69,22 +71,41 @@ async def follow_edge(services: Services, parameters: FollowEdge) -> str:
             estimate, command = steered
             services.progress.text = f"{parameters.side} edge toward the {parameters.toward}, {command.mode}"
             side = following.side(estimate)
+            if parameters.record and side is not None:
+                note_progress(services.memory, parameters, estimate.station_m, side.offset_m)
             unseen_s = np.inf if side is None else side.age_s - estimate.age_s
             if now - started > EDGE_PATIENCE_S and unseen_s > EDGE_PATIENCE_S:
                 return "edge_lost"
             if parameters.toward == "tip":
                 tip = agreed_tip(perception.tips, max(started, now - TIP_WINDOW_S))
                 if tip is not None and abs(tip - services.turbine.tip_radius_m) < TIP_WITHIN_M:
-                    services.memory.passes_done.append(parameters.side)
+                    services.memory.tip_station_m = tip
+                    done(services, parameters)
                     return "tip_detected"
                 if estimate.station_m > services.turbine.tip_radius_m + PAST_TIP_M:
                     return "edge_lost"
             elif _at_root(services, root, estimate):
-                services.memory.passes_done.append(parameters.side)
+                done(services, parameters)
                 return "root_detected"
     finally:
         perception.record(None)
     raise AssertionError("ticks never end")
+
+
+def done(services: Services, parameters: FollowEdge) -> None:
+    """The pass has reached its end; one without photographs inspects nothing."""
+    if parameters.record and parameters.side not in services.memory.passes_done:
+        services.memory.passes_done.append(parameters.side)
+
+
+def note_progress(memory: Memory, parameters: FollowEdge, station_m: float, edge_m: float) -> None:
+    """Remember how far the pass has come, in steps; one that goes on in the same direction is the same pass."""
+    travel = 1.0 if parameters.toward == "tip" else -1.0
+    before = memory.inspected.get(parameters.side)
+    if before is None or (before.to_m - before.from_m) * travel < 0:
+        memory.inspected[parameters.side] = Stretch(round(station_m, 2), round(station_m, 2), round(edge_m, 2))
+    elif (station_m - before.to_m) * travel >= PROGRESS_STEP_M:
+        memory.inspected[parameters.side] = Stretch(before.from_m, round(station_m, 2), round(edge_m, 2))
 
 
 def _at_root(services: Services, root: RootWatch, estimate: BladeEstimate) -> bool:

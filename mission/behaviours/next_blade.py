@@ -36,6 +36,7 @@ async def next_blade(services: Services, parameters: NextBlade) -> str:
         return "none_left"
     services.perception.forget()
     memory.passes_done.clear()
+    memory.inspected.clear()
     memory.tip_station_m = memory.root_station_m = None
     turbine = services.turbine
     services.refine_turbine(turbine.refined(azimuth=turbine.azimuth + 2 * np.pi / 3))

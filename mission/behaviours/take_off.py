@@ -49,6 +49,7 @@ async def take_off(services: Services, parameters: TakeOff) -> str:
         services.progress.text = "armed by somebody else"
         return "failed"
     services.memory.home = (float(ground[0]), float(ground[1]), float(ground[2]))
+    await services.keep()  # whoever goes on with this flight must know the way home
     try:
         if not autopilot.telemetry.armed:
             await autopilot.arm()

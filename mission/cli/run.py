@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mission.cli.errors import ABORTED, INTERRUPTED, OUTCOME_CODES, REFUSED, CommandError
+from mission.cli.going_on import as_before, interrupted_run
 
 if TYPE_CHECKING:
     from mission.cli.live import View
@@ -75,19 +76,25 @@ def run(
 
     A real vehicle is armed only after an explicit yes: in the terminal, or --yes in scripts. A simulated one flies.
     """
-    resumed = _interrupted_run(resume, record)
+    resumed = interrupted_run(resume, record)
+    if resumed is not None:
+        speed, system, lockstep = as_before(resumed, speed, system, lockstep)
     overrides = list(changes or []) + ([f"world.seed={seed}"] if seed is not None else [])
     mission = _mission(file, resumed, overrides, rig)
     if resumed is not None:
-        from mission.executive.resume import interrupted
+        from mission.executive.resume import last_of
 
-        interrupted(resumed.journal, mission)  # refuse what cannot be gone on with before a folder is made
+        last_of(resumed, mission)  # refuse what cannot be gone on with before a folder is made
     must_confirm = _may_fly(mission, speed=speed, lockstep=lockstep, system=system, yes=yes)
 
     from mission.record.folder import NEEDED_MB, NEEDED_WITHOUT_FRAMES_MB, create
+    from mission.record.lineage import RunNote, reference
 
     needed_mb = NEEDED_MB if _takes_frames(mission) else NEEDED_WITHOUT_FRAMES_MB
     folder = create(record, mission.name, mission.resolved_yaml, needed_mb)
+    RunNote(
+        continues=reference(resumed, folder) if resumed else None, system=system, speed=speed, lockstep=lockstep
+    ).write(folder)
     result, view = _fly(
         mission,
         folder,
@@ -105,14 +112,6 @@ def run(
     view.close()
     _close(folder, result)
     raise typer.Exit(INTERRUPTED if result.interrupted else OUTCOME_CODES.get(result.outcome, ABORTED))
-
-
-def _interrupted_run(resume: Path | None, logs: Path) -> RunFolder | None:
-    if resume is None:
-        return None
-    from mission.record.folder import open_run
-
-    return open_run(resume, logs)
 
 
 def _mission(file: Path | None, resumed: RunFolder | None, overrides: list[str], rig: str | None) -> Mission:

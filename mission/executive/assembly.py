@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mission.executive.belief import located, surveyed_turbine
-from mission.executive.resume import Interrupted, interrupted, restore, where
+from mission.executive.knowledge import Keeping, Knowledge, go_on_from, read_knowledge
+from mission.executive.resume import Interrupted, last_of, restore, where
 from mission.executive.signals import interrupting
 from mission.executive.simulation import Rehearsal
 from mission.executive.stage import FlightError, Stage, lockstep_stage, wall_stage
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FlightError", "FlightOptions", "FlightResult", "fly"]
 
-JOURNAL = "journal.jsonl"
 CONNECT_S = 20.0
 SIMULATED_LATENCY_S = 0.06  # of capture and vision, in lockstep time, where computing takes no time at all
 
@@ -72,22 +72,26 @@ def fly(options: FlightOptions) -> FlightResult:
     Raises:
         FlightError: nothing was flown (no connection, port in use, rig not there), one line with the remedy.
     """
+    from mission.record.folder import RunFolder
     from mission.record.run_log import RunLog
 
-    past = None if options.resume is None else interrupted(options.resume / JOURNAL, options.mission)
-    start_s = 0.0 if past is None else past.t
+    past = None if options.resume is None else last_of(RunFolder(options.resume), options.mission)
+    knowledge = None if past is None or past.folder is None else read_knowledge(past.folder)
+    start_s = max(0.0 if past is None else past.t, 0.0 if knowledge is None else knowledge.t)
     log = RunLog(options.folder.log)
     try:
         with lockstep_stage(options, start_s) if options.lockstep else wall_stage(options, start_s) as stage:
             if stage.world is not None:
                 _ = stage.world.renderer  # drawn for the first time before anything flies
             with asyncio.Runner(loop_factory=stage.loop_factory) as runner:
-                return runner.run(_fly(options, stage, past, log.logger))
+                return runner.run(_fly(options, stage, past, knowledge, log.logger))
     finally:
         log.close()
 
 
-async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, log: Any) -> FlightResult:
+async def _fly(
+    options: FlightOptions, stage: Stage, past: Interrupted | None, knowledge: Knowledge | None, log: Any
+) -> FlightResult:
     """Connect, fly, and close everything that was opened, whatever happens."""
     from flight.autopilot import AutopilotError
     from mission.executive.journal import Journal
@@ -101,6 +105,8 @@ async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, l
             await stage.autopilot.connect(CONNECT_S)
             if stage.check is not None:
                 await stage.check()
+            if past is not None and past.ended and stage.autopilot.telemetry.in_air:
+                raise FlightError(f"{options.resume}: that run ended ({past.ended}), and the vehicle flies: land it")
             if options.must_confirm and not options.confirm(f"Arm and fly {options.mission.name} for real?"):
                 return FlightResult("refused", options.mission.initial, False)
             for name, value in stage.parameters.items():
@@ -109,7 +115,7 @@ async def _fly(options: FlightOptions, stage: Stage, past: Interrupted | None, l
             raise FlightError(str(error)) from error
         journal = Journal(options.folder.journal, threaded=not options.lockstep)
         recorder = RunRecorder(options.folder, stage.rig.geometry.stereo.left, log, inline=options.lockstep)
-        executive, running = _compose(options, stage, journal, recorder, past, log)
+        executive, running = _compose(options, stage, journal, recorder, past, knowledge, log)
         loop = asyncio.get_running_loop()
         tasks = [loop.create_task(work, name=name) for name, work in running.items()]
         for task in tasks:
@@ -152,6 +158,7 @@ def _compose(
     journal: Journal,
     recorder: RunRecorder,
     past: Interrupted | None,
+    knowledge: Knowledge | None,
     log: Any,
 ) -> tuple[Executive, dict[str, Coroutine[Any, Any, None]]]:
     """The executive with its services, and what has to run beside it, by name."""
@@ -215,6 +222,8 @@ def _compose(
     in_air = stage.autopilot.telemetry.in_air
     if past is not None:
         restore(services, past, in_air=in_air)
+        if in_air and knowledge is not None:
+            go_on_from(perception, knowledge, stage.clock.now(), stage.clock.speed)
     executive = Executive(
         mission,
         services,
@@ -228,6 +237,7 @@ def _compose(
     beside: dict[str, Coroutine[Any, Any, None]] = {
         "vision": perception.run(),
         "telemetry": recorder.follow(stage.clock, stage.autopilot, setpoints),
+        "knowledge": Keeping(options.folder.path, perception, log, threaded=not options.lockstep).run(stage.clock),
     }
     if stage.world is not None:
         rehearsal = Rehearsal(stage.world, stage.switch, lambda: executive.state)

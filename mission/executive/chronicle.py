@@ -30,7 +30,8 @@ class Chronicle:
         self._station_m: float | None = None
 
     def begins(self, configuration: Configuration, *, autonomy: str, resumed: bool) -> None:
-        """The first line."""
+        """The first line; of a run that goes on with another, with what is known from there."""
+        memory = self._news() if resumed else None
         self._line(
             "start",
             mission=self._mission.name,
@@ -41,6 +42,7 @@ class Chronicle:
             state=configuration.leaf,
             history=configuration.history,
             taken=configuration.taken,
+            **({} if memory is None else {"memory": memory}),
         )
 
     def happened(self, queued: Queued, led_to: str, state: str, quantities: Quantities) -> None:

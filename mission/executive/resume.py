@@ -13,13 +13,17 @@ from flight.autopilot import AutopilotError, Setpoint
 from mission.behaviours.behaviour import behaviours
 from mission.executive.journal import FORMAT, Entry, read_journal
 from mission.executive.monitors.pilot import STICKS
-from mission.executive.services import Memory
+from mission.executive.services import Memory, Stretch
 from mission.language import semantics
 from mission.language.semantics import Configuration
+from mission.record.lineage import lineage
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
     from mission.language.document import Mission
+    from mission.record.folder import RunFolder
+
+LANDED = "landed"  # the outcome of a behaviour that brings the vehicle down
 
 
 class ResumeError(RuntimeError):
@@ -29,29 +33,45 @@ class ResumeError(RuntimeError):
 @dataclass(frozen=True)
 class Interrupted:
     """What a run left behind. configuration: its last settled state, with history and used-up retries. t: mission
-    seconds of its last line. station_m: how far along the blade it was last said to be."""
+    seconds of its last line. station_m: how far along the blade it was last said to be. ended: the outcome of a run
+    that came to its end before its work was done; another flight goes on with that from the mission's beginning.
+    folder: whose journal tells it."""
 
     configuration: Configuration
     memory: Memory
     t: float
     station_m: float | None = None
+    ended: str | None = None
+    folder: Path | None = None
+
+
+def last_of(folder: RunFolder, mission: Mission) -> Interrupted:
+    """What the newest of the runs that lead up to this one left behind: one that was cut off before its first decision
+    has nothing to say. Nothing anywhere: the mission's beginning.
+
+    Raises:
+        ResumeError, JournalError: as `interrupted`.
+    """
+    for run in reversed(lineage(folder)):
+        if run.journal.is_file() and read_journal(run.journal):
+            return interrupted(run.journal, mission)
+    return Interrupted(semantics.start(mission), Memory(), 0.0)
 
 
 def interrupted(journal: Path, mission: Mission) -> Interrupted:
-    """Read the journal of a run that was cut off, a torn last line included.
+    """Read the journal of a run that was cut off, a torn last line included, or that ended without having completed.
 
     Raises:
-        ResumeError: it has come to its end, or belongs to another mission or version of this program.
+        ResumeError: it has completed, or belongs to another mission or version of this program.
         JournalError: there is no journal, or it is damaged.
     """
     entries = read_journal(journal)
     if not entries:
         return Interrupted(semantics.start(mission), Memory(), 0.0)
     check_format(journal, entries)
-    ended = next((entry for entry in entries if entry.kind == "end"), None)
-    if ended is not None:
-        outcome = ended.fields.get("outcome")
-        raise ResumeError(f"{journal.parent}: that run came to its end ({outcome}); there is nothing to go on with")
+    ended = next((str(entry.fields.get("outcome")) for entry in entries if entry.kind == "end"), None)
+    if ended == "completed":
+        raise ResumeError(f"{journal.parent}: that run came to its end ({ended}); there is nothing to go on with")
     configuration, memory, station = semantics.start(mission), Memory(), None
     for entry in entries:
         if entry.kind in ("start", "transition"):
@@ -68,18 +88,24 @@ def interrupted(journal: Path, mission: Mission) -> Interrupted:
             f"{journal.parent}: it was left in {configuration.leaf}, which {mission.path.name} does not have; "
             "go on with the mission that was flown"
         )
-    return Interrupted(configuration, memory, entries[-1].t, station)
+    if ended is not None:
+        configuration, station = semantics.start(mission), None
+    return Interrupted(configuration, memory, entries[-1].t, station, ended, journal.parent)
 
 
 def where(mission: Mission, past: Interrupted, *, in_air: bool) -> Configuration:
     """Where the machine goes on.
 
-    In the air: in the settled state. On the ground, in a state that flies: from the mission's beginning, history and
-    what was found out still known, unless the run was already on its way home; then it is over.
+    In the air: in the settled state. On the ground: a landing is over, and so is a run that was on its way home from
+    an abort; anything else that flies begins anew, from the mission's beginning, with history and what was found out
+    still known.
     """
     state = mission.states[past.configuration.leaf]
-    flies = behaviours()[state.do].airborne if state.do is not None else state.final is None
-    if in_air or not flies:
+    behaviour = None if state.do is None else behaviours()[state.do]
+    grounded = state.final is not None or (
+        behaviour is not None and (behaviour.airborne is False or LANDED in behaviour.outcomes)
+    )
+    if in_air or grounded:
         return past.configuration
     if semantics.choose(mission, past.configuration, "abort", {}) is None:
         finals = (path for path, other in mission.states.items() if other.final == "aborted")
@@ -106,8 +132,14 @@ def restore(services: Services, past: Interrupted, *, in_air: bool) -> None:
                 )
             )
     else:
-        services.memory.passes_done = list(known.passes_done)
-        services.memory.tip_station_m, services.memory.root_station_m = known.tip_station_m, known.root_station_m
+        here = services.memory
+        here.passes_done, here.inspected = list(known.passes_done), dict(known.inspected)
+        here.tip_station_m, here.root_station_m = known.tip_station_m, known.root_station_m
+        here.values = {name: value for name, value in known.values.items() if not name.endswith(("_sigma", "_sigma_m"))}
+        if known.azimuth is not None:
+            # Which blade it is does not depend on the origin; how it is parked is looked at again, from afar.
+            services.refine_turbine(services.turbine.refined(azimuth=known.azimuth))
+            here.hub = here.heading = None
 
 
 async def take_up(services: Services, mission: Mission, configuration: Configuration) -> None:
@@ -121,9 +153,9 @@ async def take_up(services: Services, mission: Mission, configuration: Configura
     if telemetry.flight_mode in STICKS:
         services.raise_event("pilot_took_over", mode=telemetry.flight_mode)
         return
-    state = mission.states[configuration.leaf]
-    if state.do is not None and behaviours()[state.do].airborne is False:
-        return  # it was on the ground when that run was cut off: somebody else has flown it since
+    behaviour = behaviours()[state.do] if (state := mission.states[configuration.leaf]).do is not None else None
+    if behaviour is not None and (behaviour.airborne is False or LANDED in behaviour.outcomes):
+        return  # it was on the ground then, and somebody else has flown it since; or it comes down already
     try:
         pose = telemetry.pose
         await services.setpoints.start(Setpoint(pose.position.copy(), float(pose.attitude[2])))
@@ -131,10 +163,13 @@ async def take_up(services: Services, mission: Mission, configuration: Configura
     except AutopilotError as error:
         services.raise_event("abort", error=str(error))
         return
-    if state.do is not None and behaviours()[state.do].needs_vision and services.perception.estimate() is None:
-        services.perception.watch_blade(True)
-        if services.memory.hub is not None:
-            services.raise_event("vision_lost", resumed=True)
+    handlers = mission.handlers(configuration.leaf, "vision_lost")
+    if behaviour is None or not behaviour.needs_vision or not any(one.event == "vision_lost" for one in handlers):
+        return
+    services.perception.watch_blade(True)
+    estimate = services.perception.estimate()
+    if services.memory.hub is not None and (estimate is None or estimate.age_s > mission.limits.vision_bridge_s):
+        services.raise_event("vision_lost", resumed=True)
 
 
 def remembered(recorded: Mapping[str, Any]) -> Memory:
@@ -144,6 +179,7 @@ def remembered(recorded: Mapping[str, Any]) -> Memory:
         if known.get(name) is not None:
             north, east, down = known[name]
             known[name] = (float(north), float(east), float(down))
+    known["inspected"] = {side: Stretch(**stretch) for side, stretch in known.get("inspected", {}).items()}
     return Memory(**known)
 
 

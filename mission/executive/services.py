@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -89,9 +89,20 @@ class Progress:
     station_m: float | None = None
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """How much of one side has been flown along: from one station (m from the hub) to another, and at which offset (m,
+    in the blade frame) its edge was there."""
+
+    from_m: float
+    to_m: float
+    edge_m: float
+
+
 @dataclass
 class Memory:
-    """What behaviours found out and later ones rely on; journalled at every transition, back on resume."""
+    """What behaviours found out and later ones rely on; journalled at every transition, back on resume. inspected: side
+    → how far the pass along it has come, begun or done."""
 
     home: tuple[float, float, float] | None = None
     hub: tuple[float, float, float] | None = None
@@ -100,12 +111,19 @@ class Memory:
     tip_station_m: float | None = None
     root_station_m: float | None = None
     passes_done: list[str] = field(default_factory=list)
+    inspected: dict[str, Stretch] = field(default_factory=dict)
     values: dict[str, float] = field(default_factory=dict)
+
+
+async def _nothing_to_keep() -> None: ...
 
 
 @dataclass
 class Services:
-    """One run's services. `turbine` is what is believed of it, refined by the survey; never the simulated truth."""
+    """One run's services. `turbine` is what is believed of it, refined by the survey; never the simulated truth.
+
+    `await keep()` returns once what is in `memory` is in the journal: before something that cannot be undone.
+    """
 
     clock: Clock
     autopilot: Autopilot
@@ -121,6 +139,7 @@ class Services:
     commanded: Commanded = field(default_factory=Commanded)
     locate: Callable[[Sequence[FarSight]], Turbine | None] = lambda sights: None
     on_turbine_refined: Callable[[Turbine], None] = lambda turbine: None
+    keep: Callable[[], Awaitable[None]] = _nothing_to_keep
 
     @property
     def streaming(self) -> bool:

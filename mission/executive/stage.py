@@ -26,7 +26,7 @@ from mission.executive.simulation import Switch, build_world
 
 if TYPE_CHECKING:
     from devices.rig import Rig
-    from devices.vehicle.spawn import VehicleProcess
+    from devices.vehicle.handover import RunningVehicle
     from devices.world.world import World
     from flight.autopilot import Autopilot
     from mission.executive.assembly import FlightOptions
@@ -100,10 +100,12 @@ def wall_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Stage]:
     speed = speed_for(rig_file, options.system, options.speed)
     simulated = is_simulated(rig_file, options.system)
     with ExitStack() as stack:
-        vehicle = None
+        vehicle: RunningVehicle | None = None
         world = build_world(mission) if rig_file.kind in SIMULATED_KINDS else None
         if system == EMBEDDED:
-            vehicle = _spawn(options, speed)
+            from mission.executive.embedded import embedded_vehicle
+
+            vehicle = embedded_vehicle(options, speed)
             stack.callback(vehicle.stop)
             system = vehicle.system_address
         clock = WallClock(speed, start_s)
@@ -155,38 +157,11 @@ def _geometry(options: FlightOptions) -> RigGeometry:
         raise FlightError(str(error)) from error
 
 
-def _spawn(options: FlightOptions, speed: float) -> VehicleProcess:
-    from devices.vehicle.settings import LinkSettings, ProcessSettings, VehicleSettings
-    from devices.vehicle.spawn import SpawnError, spawn
-    from devices.world.settings import WorldSettings
-
-    mission = options.mission
-    settings = mission.world or WorldSettings()
-    try:
-        return spawn(
-            ProcessSettings(
-                vehicle=VehicleSettings.of_world(settings),
-                seed=settings.seed,
-                speed=speed,
-                links=(LinkSettings(),),
-                folder=options.folder.telemetry.resolve(),
-                watch_parent=True,
-                world={
-                    "turbine": mission.turbine.model_dump(),
-                    "site": mission.site.model_dump(),
-                    "settings": settings.model_dump(),
-                },
-            )
-        )
-    except SpawnError as error:
-        raise FlightError(str(error)) from error
-
-
 def _rig(
     options: FlightOptions,
     stack: ExitStack,
     world: World | None,
-    vehicle: VehicleProcess | None,
+    vehicle: RunningVehicle | None,
     clock: WallClock,
     autopilot: Autopilot,
 ) -> tuple[Rig, Switch | None]:

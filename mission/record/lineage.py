@@ -1,0 +1,58 @@
+"""Runs that go on with one another: what each says of the one before it, and all of them in order."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from mission.record.folder import RunFolder
+
+NOTE = "run.json"
+
+
+class RunNote(BaseModel):
+    """How a run was begun, as far as going on with it needs to know. continues: folder of the run before it, by its
+    name where both lie side by side. system, speed: None for the rig file's own."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    continues: str | None = None
+    system: str | None = None
+    speed: float | None = None
+    lockstep: bool = False
+
+    def write(self, folder: RunFolder) -> None:
+        """Put it into the run's folder, whole.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        draft = folder.path / (NOTE + ".part")
+        draft.write_text(self.model_dump_json() + "\n", "utf-8")
+        draft.replace(folder.path / NOTE)
+
+
+def note_of(folder: RunFolder) -> RunNote:
+    """What a run's folder says; where it says nothing, a run of its own."""
+    try:
+        return RunNote.model_validate_json((folder.path / NOTE).read_text("utf-8"))
+    except (OSError, ValidationError, UnicodeDecodeError):
+        return RunNote()
+
+
+def reference(to: RunFolder, seen_from: RunFolder) -> str:
+    """How one run's folder is named in another's note."""
+    there, here = to.path.resolve(), seen_from.path.resolve()
+    return there.name if there.parent == here.parent else str(there)
+
+
+def lineage(folder: RunFolder) -> tuple[RunFolder, ...]:
+    """The runs that this one goes on with, oldest first, itself last. One that has been removed ends the row."""
+    found = [folder]
+    seen = {folder.path.resolve()}
+    while (before := note_of(found[0]).continues) is not None:
+        path = found[0].path.resolve().parent / before
+        if path.resolve() in seen or not (path / "mission.yaml").is_file():
+            break
+        seen.add(path.resolve())
+        found.insert(0, RunFolder(path))
+    return tuple(found)
