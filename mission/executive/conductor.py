@@ -19,7 +19,7 @@ from mission.executive.decision import Autonomy, autonomy_after, decide
 from mission.executive.events import EVENTS, event
 from mission.executive.gate import Gate, guard_services
 from mission.executive.helm import PULSE_S, Helm
-from mission.executive.journal import Journal
+from mission.executive.journal import SLOWEST_DISK_S, Journal
 from mission.executive.machine import Machine
 from mission.executive.question import Ask, Question, Questions
 from mission.executive.queue import EventQueue, Queued
@@ -191,7 +191,7 @@ class Conductor:
         step = semantics.take(self.mission, self._machine.configuration, transition, queued.name)
         self._chronicle.steps(step)
         if self._chronicle.journal.pending:
-            await self._helm.patiently(self._chronicle.journal.durable())
+            await self._helm.patiently(self._chronicle.journal.durable(), SLOWEST_DISK_S)
         await self._machine.take(queued.name, quantities, queued.origin, transition)
         now = self._clock.now()
         self._timing = self._timing.stepping(self.mission, step, now)

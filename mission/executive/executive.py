@@ -12,7 +12,7 @@ from mission.behaviours.behaviour import behaviours
 from mission.executive.conductor import Conductor
 from mission.executive.decision import Autonomy
 from mission.executive.events import event
-from mission.executive.journal import Journal
+from mission.executive.journal import SLOWEST_DISK_S, Journal
 from mission.executive.machine import entries
 from mission.executive.question import Ask
 from mission.executive.resume import take_up
@@ -80,7 +80,7 @@ class Executive(Conductor):
             await self._work.stop(self._helm.beat)
             await self._helm.leave()
             self._chronicle.ends(self._ended, self.state, self._why)
-            await self._helm.patiently(self._chronicle.journal.durable())
+            await self._helm.patiently(self._chronicle.journal.durable(), SLOWEST_DISK_S)
             return Outcome(self._ended, self.state, self.interrupted)
         finally:
             self._questions.close()

@@ -42,13 +42,15 @@ class Helm:
         if stroke is not None:
             stroke()
 
-    async def patiently(self, awaitable: Awaitable[Any]) -> None:
-        """Wait without appearing dead. What the gate has stopped is over, and no error."""
+    async def patiently(self, awaitable: Awaitable[Any], at_most_s: float = float("inf")) -> None:
+        """Wait without appearing dead, for `at_most_s` of the event loop. What the gate has stopped is over, and no
+        error."""
         task = asyncio.ensure_future(awaitable)
-        while not task.done():
+        until = asyncio.get_running_loop().time() + at_most_s
+        while not task.done() and asyncio.get_running_loop().time() < until:
             self.beat()
             await asyncio.wait([task], timeout=PULSE_S)
-        if not task.cancelled():
+        if task.done() and not task.cancelled():
             task.result()
 
     def hold(self) -> None:

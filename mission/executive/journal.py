@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 FORMAT = 1  # of the journal, as its first line says
-_SLOWEST_DISK_S = 1.0  # a disk that takes longer must not hold up the flight
+_encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False).encode
+SLOWEST_DISK_S = 1.0  # a disk that takes longer must not hold up the flight
 
 
 class JournalError(RuntimeError):
@@ -53,32 +54,36 @@ class Journal:
         self._file = None if path is None else _opened(path, sync)
         self._writer = ThreadPoolExecutor(1, "journal") if threaded and path is not None else None
         self._last: Future[None] | None = None
+        self._held = ""
 
     @property
     def pending(self) -> bool:
         """Whether there is anything to wait for."""
-        return self._last is not None and not self._last.done()
+        return bool(self._held) or (self._last is not None and not self._last.done())
 
     def append(self, kind: str, t: float, *, soon: bool = False, **fields: Any) -> Entry:
-        """Write one line; `durable` waits for it. `soon`: the line that follows at once takes this one to the disk."""
+        """Write one line; `durable` waits for it. `soon`: it goes to the disk together with the next line."""
         entry = Entry(self._seq, round(t, 3), kind, {name: _plain(value) for name, value in fields.items()})
         self._seq += 1
-        line = json.dumps(
-            {"seq": entry.seq, "t": entry.t, "kind": kind, **entry.fields}, allow_nan=False, ensure_ascii=False
-        )
-        if self._writer is not None:
-            self._last = self._writer.submit(self._write, line, soon)
-        else:
-            self._write(line, soon)
+        self._held += _encode({"seq": entry.seq, "t": entry.t, "kind": kind, **entry.fields}) + "\n"
+        if self._writer is None or not soon:
+            self._hand_over(soon)
         return entry
 
-    async def durable(self) -> None:
-        """Wait until every line so far is on the disk, or lost, or the disk has taken too long."""
+    def durable(self) -> asyncio.Future[None]:
+        """Done when every line so far is on the disk, or lost. Whoever waits for it waits for `SLOWEST_DISK_S` at
+        most."""
+        self._hand_over()
+        loop = asyncio.get_running_loop()
         if self._last is not None and self.pending:
-            await asyncio.wait([asyncio.wrap_future(self._last)], timeout=_SLOWEST_DISK_S)
+            return asyncio.wrap_future(self._last, loop=loop)
+        done = loop.create_future()
+        done.set_result(None)
+        return done
 
     def close(self) -> None:
         """Write what is left and close; idempotent."""
+        self._hand_over()
         if self._writer is not None:
             self._writer.shutdown(wait=True)
             self._writer = None
@@ -89,22 +94,31 @@ class Journal:
                 self._fail(error)
             self._file = None
 
-    def _write(self, line: str, soon: bool) -> None:
+    def _hand_over(self, soon: bool = False) -> None:
+        lines, self._held = self._held, ""
+        if not lines:
+            return
+        if self._writer is not None:
+            self._last = self._writer.submit(self._write, lines, soon)
+        else:
+            self._write(lines, soon)
+
+    def _write(self, lines: str, soon: bool) -> None:
         if self._file is None:
             return
         if self.error is not None:
-            self.lost += 1
+            self.lost += lines.count("\n")
             return
         try:
-            self._file.write(line.encode() + b"\n")
+            self._file.write(lines.encode())
             self._file.flush()
             if self._sync and not soon:
                 os.fsync(self._file.fileno())
         except (OSError, ValueError) as error:
-            self._fail(error)
+            self._fail(error, lines.count("\n"))
 
-    def _fail(self, error: Exception) -> None:
-        self.lost += 1
+    def _fail(self, error: Exception, lines: int = 1) -> None:
+        self.lost += lines
         if self.error is None:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             self.error = f"{self.path}: the journal cannot be written any more ({reason}); free space or check the disk"

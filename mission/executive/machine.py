@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from transitions.extensions.asyncio import HierarchicalAsyncMachine, NestedAsyncState
+from transitions.extensions.asyncio import HierarchicalAsyncMachine, NestedAsyncState, NestedAsyncTransition
 
 from mission.executive.events import fallbacks
 from mission.language import semantics
@@ -30,13 +30,40 @@ class _State(NestedAsyncState):
     separator = "."
 
 
+class _Transition(NestedAsyncTransition):
+    """What costs time and gives nothing here is left out: tasks for guards, and callbacks on final states."""
+
+    async def _eval_conditions(self, event_data: Any) -> bool:
+        return all([await condition.check(event_data) for condition in self.conditions])
+
+    def _final_check(self, event_data: Any, state_tree: Any, enter_partials: Any) -> tuple[list[Any], bool]:
+        return [], False
+
+
 class _Library(HierarchicalAsyncMachine):
     state_cls = _State
+    transition_cls = _Transition
 
-    @staticmethod
-    async def await_all(callables: Iterable[Callable[[], Awaitable[Any]]]) -> list[Any]:
-        """One after the other: a task for each guard would cost more than all guards together."""
-        return [await call() for call in callables]
+    def __init__(self, **settings: Any) -> None:
+        self._known: dict[str, Any] = {}
+        super().__init__(**settings)
+
+    def get_state(self, state: Any, hint: Any = None) -> Any:
+        """As the library finds it, but once for each path."""
+        path = ".".join((*self.prefix_path, state if isinstance(state, str) else ".".join(state)))
+        found = self._known.get(path)
+        if found is None:
+            found = super().get_state(state, hint)
+            if hint is None:
+                self._known[path] = found
+        return found
+
+    async def process_context(self, func: Callable[[], Awaitable[bool]], model: Any) -> bool:
+        """One task alone moves this machine, and its cancellation is nothing to swallow."""
+        return await func()
+
+    async def cancel_running_transitions(self, model: Any, msg: Any = None) -> None:
+        """There are none: see `process_context`."""
 
     async def callbacks(self, funcs: Iterable[Any], event_data: Any) -> None:  # type: ignore[override, unused-ignore]
         """One after the other, and nothing at all where there are none."""
@@ -107,7 +134,7 @@ class Machine:
         """
         before = self.configuration
         attempt = self._attempt = _Attempt(quantities, origin, only)
-        for name in fallbacks(event):
+        for name in fallbacks(event) if only is None else (only.event,):
             if name in self._library.events and await self._position.trigger(name):  # type: ignore[attr-defined]
                 break
         if attempt.taken is None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 CANCEL_S = 0.5  # of the event loop: how long a behaviour may take to stop before it is abandoned
 _SLICE_S = 0.05
+_PASSES = 3  # of the event loop: most behaviours end within these, and no timer is needed
 _REST_S = 0.5
 
 
@@ -91,6 +92,10 @@ class Work:
         if task is None or task.done():
             return True
         task.cancel()
+        for _ in range(_PASSES):
+            await asyncio.sleep(0)
+            if task.done():
+                return True
         loop = asyncio.get_running_loop()
         until = loop.time() + CANCEL_S
         while not task.done() and loop.time() < until:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -127,16 +128,24 @@ class Mission:
         All entries for the event itself come first, inner states before outer ones; then those for the event it falls
         back to, and so on.
         """
-        from mission.executive.events import fallbacks
+        known = self._handlers.get((path, event))
+        if known is None:
+            from mission.executive.events import fallbacks
 
-        owners = [self.states[owner].on for owner in self.ancestors(path)] + [self.on]
-        return tuple(
-            transition
-            for name in fallbacks(event)
-            for owner in owners
-            for transition in owner
-            if transition.event == name
-        )
+            owners = [self.states[owner].on for owner in self.ancestors(path)] + [self.on]
+            known = self._handlers[path, event] = tuple(
+                transition
+                for name in fallbacks(event)
+                for owner in owners
+                for transition in owner
+                if transition.event == name
+            )
+        return known
+
+    @cached_property
+    def _handlers(self) -> dict[tuple[str, str], tuple[Transition, ...]]:
+        """What `handlers` has found so far: the proof and the executive ask again and again."""
+        return {}
 
     def transitions(self) -> tuple[Transition, ...]:
         """Every declared transition."""
