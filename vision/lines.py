@@ -11,25 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
+from vision.line_kernels import gradients, line_votes, median_roughness, refine, ridge
 
 Array = NDArray[Any]  # of floats
 
 ANGLES = 60  # bins of 3° modulo 180°
 SPREAD = 1  # bins to each side that a pixel votes for: its gradient's direction is no better known
 MOST_PIXELS = 6000  # edge pixels that vote, the strongest
-RHO_STEP = 2.0  # px of the half-size image
+RHO_STEP = 4.0  # px
 REACH = 7  # px across a candidate line within which its step is looked for
 SAMPLES = 96  # profiles along a candidate line
-FOCUS_PX = 160.0  # standard deviation of the weight about the place where a bending edge is to be right
-SLOPE_HELD, BEND_HELD = 0.05, 1e-4  # what a fit of few steps is held to: slope, and change of slope per px over two
+MARGIN = 3.0  # px along the image border in which no steps are sought
+LEAST_SCATTER_PX, LEAST_SIGMA_PX = 0.1, 0.04  # of steps about their line, and of a line: what no fit falls below
 
 
 def sensor_noise(tones: Image) -> float:
     """Standard deviation of the noise in grey levels, from what neighbours do not share in the quiet half of the
     image."""
-    part = tones[1::4, :, 0]
-    rough = part[:, 1:-1:7].astype(np.int16) * 2 - part[:, :-2:7] - part[:, 2::7]
-    return max(0.6, 1.4826 * float(np.median(np.abs(rough))) / float(np.sqrt(6.0)))
+    return max(0.6, 1.4826 * float(median_roughness(tones)) / float(np.sqrt(6.0)))
 
 
 @dataclass(frozen=True)
@@ -42,45 +41,15 @@ class Gradients:
 
 
 def edge_pixels(tones: Image, noise: float) -> Gradients:
-    """Pixels whose brightness changes by more than noise."""
-    half = cv2.resize(tones, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    half = cv2.blur(half, (3, 3))
-    planes = [half] if half.ndim == 2 else list(cv2.split(half))
-    dx, dy, strength = _sobel(planes[0])
-    for plane in planes[1:]:
-        other_dx, other_dy, other = _sobel(plane)
-        stronger = cv2.compare(other, strength, cv2.CMP_GT)
-        cv2.copyTo(other_dx, stronger, dx)
-        cv2.copyTo(other_dy, stronger, dy)
-        cv2.max(other, strength, strength)
-    ridge = _ridge(dx, dy, strength)
-    v, u = np.nonzero(ridge[2:-2, 2:-2] > max(2.0, 1.4 * noise))
-    v, u = v + 2, u + 2
-    level = strength[v, u]
-    threshold = max(2.0, 1.4 * noise)
-    if len(u) > MOST_PIXELS:
-        threshold = max(threshold, float(np.partition(level, -MOST_PIXELS)[-MOST_PIXELS]))
-        keep = level >= threshold
-        v, u = v[keep], u[keep]
-    gx, gy = dx[v, u].astype(np.float32), dy[v, u].astype(np.float32)
-    weight = np.minimum(np.hypot(gx, gy) / (10 * threshold), 1.0)
+    """Pixels whose brightness changes by more than noise, where it changes most."""
+    height, width = tones.shape[0] // 2, tones.shape[1] // 2
+    dx, dy, strength = np.empty((3, height, width), np.float32)
+    gradients(tones, dx, dy, strength)
+    (u, v, gx, gy), threshold = ridge(dx, dy, strength, max(2.0, 1.4 * noise), MOST_PIXELS)
+    weight = np.minimum(np.hypot(gx, gy) / np.float32(10 * threshold), np.float32(1))
     centre = (np.array(tones.shape[1::-1]) - 1) / 2
-    position = np.column_stack([u, v]) * 2 + 0.5 - centre
+    position = np.stack([u, v], axis=1) * 2.0 + (0.5 - centre)
     return Gradients(position, np.arctan2(gy, gx), weight)
-
-
-def _sobel(plane: Image) -> tuple[NDArray[np.int16], NDArray[np.int16], Image]:
-    dx, dy = cv2.Sobel(plane, cv2.CV_16S, 1, 0), cv2.Sobel(plane, cv2.CV_16S, 0, 1)
-    strength = cv2.addWeighted(cv2.convertScaleAbs(dx), 0.5, cv2.convertScaleAbs(dy), 0.5, 0)
-    return dx, dy, strength
-
-
-def _ridge(dx: NDArray[np.int16], dy: NDArray[np.int16], strength: Image) -> Image:
-    """The strength where it is greatest across the step, zero elsewhere."""
-    upright = cv2.compare(cv2.convertScaleAbs(dx), cv2.convertScaleAbs(dy), cv2.CMP_GE)
-    highest = cv2.dilate(strength, np.ones((3, 1), np.uint8))
-    cv2.copyTo(cv2.dilate(strength, np.ones((1, 3), np.uint8)), upright, highest)
-    return np.asarray(cv2.copyTo(strength, cv2.compare(strength, highest, cv2.CMP_EQ)), np.uint8)
 
 
 def smoothed(tones: Image) -> Image:
@@ -115,19 +84,10 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
 
     size: (width, height) of the working image.
     """
-    reach = np.hypot(*size) / 4  # of the half-size image
-    bins = int(2 * reach / RHO_STEP) + 3
-    own = np.floor((pixels.angle % np.pi) / np.pi * ANGLES).astype(np.int64) % ANGLES
+    reach = float(np.hypot(*size)) / 2
+    table = np.zeros((ANGLES, int(2 * reach / RHO_STEP) + 3), np.float32)
+    line_votes(pixels.position, pixels.angle, pixels.weight, SPREAD, reach, RHO_STEP, table)
     theta = (np.arange(ANGLES) + 0.5) * np.pi / ANGLES
-    cosine, sine = np.cos(theta), np.sin(theta)
-    x, y = pixels.position[:, 0] / 2, pixels.position[:, 1] / 2
-    votes = np.zeros(ANGLES * bins)
-    for step in range(-SPREAD, SPREAD + 1):
-        angle = (own + step) % ANGLES
-        rho = x * cosine[angle] + y * sine[angle]
-        place = np.rint((rho + reach) / RHO_STEP).astype(np.int64) + 1
-        votes += np.bincount(angle * bins + place, pixels.weight, votes.size)[: votes.size]
-    table = votes.reshape(ANGLES, bins).astype(np.float32)
     wrapped = np.vstack([table[-2:, ::-1], table, table[:2, ::-1]])
     wrapped = cv2.blur(wrapped, (3, 1))
     highest = cv2.dilate(wrapped, np.ones((3, 5), np.uint8))
@@ -135,7 +95,7 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
     a, r = np.nonzero(peaks)
     strength = wrapped[2:-2][a, r].astype(float)
     order = np.argsort(-strength, kind="stable")[:most]
-    rho = ((r[order] - 1) * RHO_STEP - reach) * 2
+    rho = (r[order] - 1) * RHO_STEP - reach
     return np.column_stack([theta[a[order]], rho]), strength[order]
 
 
@@ -196,41 +156,14 @@ def refine_lines(
     smooth: the tones (h, w, c) after a 3 × 3 mean. normal (k, 2), rho (k,) in the image frame. focus (k,): the place
     along each line around which it is to be right, where the edge bends.
     """
-    height, width = smooth.shape[:2]
-    centre = np.array([(width - 1) / 2, (height - 1) / 2])
-    start, end = visible_stretch(normal, rho, centre - 3)
-    share = np.linspace(0, 1, samples)
-    t = start[:, None] + (end - start)[:, None] * share
+    lines = len(rho)
+    t, offset, step = np.empty((3, lines, samples))
+    agrees = np.empty((lines, samples), np.bool_)
+    fit, spread = np.empty((2, lines, 3))
+    normal, rho, focus = (np.ascontiguousarray(values, float) for values in (normal, rho, focus))
+    least, largest = max(1.2, 1.4 * noise), float(np.deg2rad(slopes_deg))
+    refine(smooth, normal, rho, focus, MARGIN, least, reach, largest, t, offset, step, agrees, fit, spread)
     direction = np.column_stack([-normal[:, 1], normal[:, 0]])
-    across = np.arange(-reach - 1, reach + 2, dtype=float)
-    base = (
-        (rho[:, None, None] + across) * normal[:, 0, None, None],
-        (rho[:, None, None] + across) * normal[:, 1, None, None],
-    )
-    u = base[0] + t[..., None] * direction[:, 0, None, None] + centre[0]
-    v = base[1] + t[..., None] * direction[:, 1, None, None] + centre[1]
-    raw = steps(sampled(smooth, u, v))
-    gradient: Array = (raw + 0.5 * (np.roll(raw, 1, 1) + np.roll(raw, -1, 1))) / 2
-    size = np.abs(gradient)
-    best = np.argmax(size[..., 1:-1], axis=-1) + 1
-    before, peak, after = (np.take_along_axis(size, (best + k)[..., None], -1)[..., 0] for k in (-1, 0, 1))
-    bend = before - 2 * peak + after
-    with np.errstate(divide="ignore", invalid="ignore"):
-        fraction = np.where(bend < 0, 0.5 * (before - after) / bend, 0.0)
-    offset = across[1:-1][best] + np.clip(fraction, -0.5, 0.5)
-    step = np.take_along_axis(gradient, best[..., None], -1)[..., 0]
-    real = peak > max(1.2, 1.4 * noise)
-    place = t - focus[:, None]
-    slope, shift = _vote_slope(place, offset, real, slopes_deg)
-    fit = np.stack([shift, slope, np.zeros_like(slope)], axis=1)
-    near = np.exp(-0.5 * (place / FOCUS_PX) ** 2)
-    design = np.stack([np.ones_like(place), place, place * place], axis=2)
-    for tolerance in (2.0, 1.2, 1.0, 1.0):
-        residual = offset - (design @ fit[..., None])[..., 0]
-        weight = real * near / (1 + (residual / tolerance) ** 2) ** 2
-        fit, information = _weighted_curve(design, offset, weight, fit)
-    residual = offset - (design @ fit[..., None])[..., 0]
-    agrees = real & (np.abs(residual) < 1.5)
     turn = np.arctan(fit[:, 1])
     new_normal = np.column_stack(
         [
@@ -240,42 +173,8 @@ def refine_lines(
     )
     point = normal * (rho + fit[:, 0])[:, None] + direction * focus[:, None]
     new_rho = (new_normal * point).sum(axis=1)
-    used = agrees * near
-    scatter2 = (residual**2 * used).sum(axis=1) / np.maximum(used.sum(axis=1), 1) + 0.01
     # Neighbouring profiles share pixels: three of them count as one.
-    covariance = np.linalg.inv(information) * (2 * scatter2)[:, None, None]
-    slope_sigma = np.sqrt(covariance[:, 1, 1])
-    rho_sigma = np.sqrt(covariance[:, 0, 0] + 0.04**2)
-    bend_px = 2 * fit[:, 2]
-    return Profiles(new_normal, new_rho, t, residual, step, agrees, slope_sigma, rho_sigma, bend_px, focus)
-
-
-def _vote_slope(t: Array, offset: Array, real: NDArray[np.bool_], slopes_deg: float) -> tuple[Array, Array]:
-    """Slope and offset (k,) on which most of the steps lie, by trying slopes and counting offsets."""
-    slopes = np.tan(np.deg2rad(np.linspace(-slopes_deg, slopes_deg, 13)))
-    bins = 40
-    lines = len(t)
-    index = np.arange(lines)[:, None]
-    best = np.full(lines, -1.0)
-    slope, shift = np.zeros(lines), np.zeros(lines)
-    near = real * np.exp(-0.5 * (t / 120) ** 2)
-    for tried in slopes:
-        place = np.clip(np.rint(offset - tried * t), -bins // 2 + 1, bins // 2 - 1).astype(np.int64) + bins // 2
-        counts: Array = np.bincount((index * bins + place).ravel(), near.ravel(), lines * bins).reshape(lines, bins)
-        counts[:, 1:-1] += 0.6 * (counts[:, :-2] + counts[:, 2:])
-        counts[:, [0, 1, -2, -1]] = 0
-        top = counts.argmax(axis=1)
-        value = counts[np.arange(lines), top] - 1e-3 * abs(tried)
-        better = value > best
-        best[better], slope[better], shift[better] = value[better], tried, (top - bins // 2)[better]
-    return slope, shift
-
-
-def _weighted_curve(design: Array, offset: Array, weight: Array, before: Array) -> tuple[Array, Array]:
-    """Offset, slope and bend (k, 3) by weighted least squares, held straight where little speaks for a bend."""
-    held = np.diag([1e-4, 1e-4 / SLOPE_HELD**2, 1.0 / BEND_HELD**2])
-    weighted = design * weight[..., None]
-    information = np.einsum("kmi,kmj->kij", weighted, design) + held
-    fit = np.linalg.solve(information, np.einsum("kmi,km->ki", weighted, offset)[..., None])[..., 0]
-    good = (weight.sum(axis=1) > 2)[:, None]
-    return np.where(good, fit, before), information
+    variance = 2 * (spread[:, 2] + LEAST_SCATTER_PX**2)
+    slope_sigma = np.sqrt(variance * spread[:, 1])
+    rho_sigma = np.sqrt(variance * spread[:, 0] + LEAST_SIGMA_PX**2)
+    return Profiles(new_normal, new_rho, t, offset, step, agrees, slope_sigma, rho_sigma, 2 * fit[:, 2], focus)
