@@ -19,11 +19,13 @@ Peaks = NDArray[np.int64]
 
 NEIGHBOURHOOD = 7  # px of the half-size image, what a dot is compared with; about half the spacing of the grid
 RING = 4  # px of the half-size image, where a dot of a single laser-on image must have fallen off on every side
-LIFT = 48  # grey levels added to the difference, so that noise below zero is not lost
+SIGNIFICANT = 4.0  # standard deviations, from which a gain of light is no noise
+LEAST_NOISE = 0.1  # grey levels, of a 3 × 3 mean of the half-size image
 MOST = 180  # candidates kept, the strongest; the grid has 121 dots
 USUAL_SHAPE = (0.4, 0.0, 0.4)  # 1/px², before the image has shown its own
 SHAPED = 16  # spots of which the shape is learnt
 SHAPE_REACH = 6  # px, half the square in which the shape is learnt
+BURNT_LEVEL = 90.0  # grey levels, first guess of a spot whose middle is burnt out
 REACHES = (4, 8)  # px, least and largest half square in which a spot is measured
 APART = 4.0  # px, nearer to a stronger one a spot is part of it
 
@@ -55,50 +57,57 @@ def find_spots(off: Image | None, on: Image, reachable: Image | None = None, oth
     small = halved(on)
     motion = np.zeros(2)
     if off is None:
-        peaks = _peaks(_lone(small), 5.0, reachable)
+        peaks = _peaks(_lone(small), 4.0, reachable)
     else:
         small_off = halved(off)
         motion = motion_between(small_off, small, None if other is None else other.motion)
-        peaks = _peaks(*_response(small_off, small, motion), reachable)
+        peaks = _peaks(_response(small_off, small, motion), SIGNIFICANT, reachable)
     shape = np.array(USUAL_SHAPE) if other is None else other.shape
     return _measured(on, off, peaks, motion, shape)
 
 
-def _response(off: Image, on: Image, motion: Array) -> tuple[Image, float]:
-    """How much each pixel of the half-size image has gained over its neighbourhood, and what gain is no noise."""
+def _response(off: Image, on: Image, motion: Array) -> Array:
+    """By how many standard deviations each pixel of the half-size image (h, w) has gained on its neighbourhood. A step
+    that the two images may show at slightly different places counts as noise."""
+    still = off
     if motion.any():
-        off = shifted(off, motion / 2)
-    difference = cv2.addWeighted(on, 1.0, off, -1.0, LIFT)
+        still = shifted(off, motion / 2)
+    difference = cv2.subtract(on, still, dtype=cv2.CV_32F)
     if motion.any():
         margin = int(np.ceil(np.abs(motion).max() / 2)) + 1
         for border in (difference[:margin], difference[-margin:], difference[:, :margin], difference[:, -margin:]):
-            border[:] = LIFT
-    response = cv2.subtract(cv2.blur(difference, (3, 3)), cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD)))
-    typical = float(np.mean(np.minimum(response[::3, ::3], 6)))  # what moved against its background tells no noise
-    return np.asarray(response, np.uint8), max(2.0, 6.0 * typical)
+            border[:] = 0
+    response = cv2.blur(difference, (3, 3)) - cv2.blur(difference, (NEIGHBOURHOOD, NEIGHBOURHOOD))
+    noise = max(1.4826 * float(np.median(np.abs(response[2::5, 1::3]))), LEAST_NOISE)
+    soft = cv2.blur(still, (3, 3))
+    steps = cv2.magnitude(
+        cv2.Sobel(soft, cv2.CV_32F, 1, 0, scale=0.125), cv2.Sobel(soft, cv2.CV_32F, 0, 1, scale=0.125)
+    )
+    return np.asarray(response / cv2.max(cv2.blur(steps, (3, 3)) * (REGISTRATION_PX / 2 / SIGNIFICANT * 4), noise))
 
 
-def _lone(on: Image) -> Image:
-    """How far each pixel of the half-size image stands above the brightest on a ring around it: neither edges nor
-    cables do, for the ring meets them, too."""
+def _lone(on: Image) -> Array:
+    """How far each pixel of the half-size image stands above the brightest on a ring around it, in standard
+    deviations: neither edges nor cables do, for the ring meets them, too."""
     v, u = np.mgrid[-RING : RING + 1, -RING : RING + 1]
     ring = (np.abs(np.hypot(u, v) - RING) < 0.5).astype(np.uint8)
-    soft = cv2.blur(on, (3, 3))
-    return np.asarray(cv2.subtract(soft, cv2.dilate(soft, ring)), np.uint8)
+    soft = cv2.GaussianBlur(on, (5, 5), 0)
+    response = cv2.subtract(soft, cv2.dilate(soft, ring), dtype=cv2.CV_32F)
+    return np.asarray(response)
 
 
-def _peaks(response: Image, threshold: float, reachable: Image | None) -> Peaks:
+def _peaks(response: Array, threshold: float, reachable: Image | None) -> Peaks:
     """Local maxima above a threshold in the half-size response: (n, 2) (u, v) of the whole image, the strongest
     first."""
     highest = cv2.dilate(response, np.ones((5, 5), np.uint8))
-    _, strong = cv2.threshold(response, threshold, 255, cv2.THRESH_BINARY)
-    mask = cv2.bitwise_and(cv2.compare(response, highest, cv2.CMP_EQ), strong)
-    found = cv2.findNonZero(mask)
+    found = cv2.findNonZero(
+        cv2.bitwise_and(cv2.compare(response, highest, cv2.CMP_EQ), cv2.compare(response, threshold, cv2.CMP_GT))
+    )
     if found is None:
         return np.empty((0, 2), np.int64)
     small = found.reshape(-1, 2).astype(np.int64)
     uv = 2 * small
-    level = response[small[:, 1], small[:, 0]].astype(np.int64)
+    level = response[small[:, 1], small[:, 0]]
     if reachable is not None:
         can = reachable[np.minimum(uv[:, 1], reachable.shape[0] - 1), np.minimum(uv[:, 0], reachable.shape[1] - 1)] > 0
         uv, level = uv[can], level[can]
@@ -173,7 +182,8 @@ def _started(light: _Lights, reach: int) -> Array:
     found = np.zeros((len(light.signal), 4))
     side = 2 * reach + 1
     middle = light.signal.reshape(-1, side, side)[:, reach - 1 : reach + 2, reach - 1 : reach + 2]
-    found[:, 2] = np.maximum(middle.mean(axis=(1, 2)), 1.0)
+    burnt = light.burnt.reshape(-1, side, side)[:, reach, reach]
+    found[:, 2] = np.maximum(middle.mean(axis=(1, 2)), np.where(burnt, BURNT_LEVEL, 1.0))
     return found
 
 

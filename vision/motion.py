@@ -15,7 +15,9 @@ Array = NDArray[Any]  # of floats
 
 LARGEST_MOTION = 14.0  # px between laser-off and laser-on
 SMALLEST_MOTION = 0.1  # px; less is not told from none
-COARSEST = 8  # the coarsest level is the image's size over this: the largest motion is less than two of its pixels
+COARSEST = 8  # the coarsest level is the image's size over this
+REACH = 2  # px of the coarsest level, beyond the largest motion
+HELD = 3e-3  # weight of a level's start against the level's own information
 GAIN = 0.97  # a motion must bring the images nearer to each other by this factor
 
 
@@ -42,10 +44,10 @@ def motion_between(off: Image, on: Image, guess: Array | None = None) -> Array:
     pairs = [(off, on)]
     for _ in range(2):
         pairs.append((halved(pairs[-1][0]), halved(pairs[-1][1])))
-    starts = [np.zeros(2)] if guess is None or not guess.any() else [np.zeros(2), np.asarray(guess, float)]
-    coarse = [_followed(*pairs[2], start / 8, 12) for start in starts]
-    best = min(coarse, key=lambda shift: _difference(*pairs[2], shift))
-    middle = _followed(*pairs[1], 2 * best, 6)
+    start = np.zeros(2) if guess is None else np.asarray(guess, float) / COARSEST
+    if not start.any():
+        _search(*pairs[2], start)
+    middle = _followed(*pairs[1], 2 * _followed(*pairs[2], start, 4), 6)
     motion = _followed(*pairs[0], 2 * middle, 3, 2) if np.hypot(*middle) * 4 > SMALLEST_MOTION else middle * 2
     if not SMALLEST_MOTION < 2 * np.hypot(*motion) < LARGEST_MOTION:
         return np.zeros(2)
@@ -83,9 +85,28 @@ def _mean_difference(off: Image, on: Image, du: float, dv: float) -> float:
 
 
 @compiled
+def _search(off: Image, on: Image, shift: Array) -> None:
+    """Write into shift (2,) the whole pixels at which off, moved by them, differs least from on, the largest
+    differences bounded; of like ones, the smaller."""
+    height, width = on.shape
+    best = np.inf
+    for dv in range(-REACH, REACH + 1):
+        for du in range(-REACH, REACH + 1):
+            total = 0
+            for v in range(REACH, height - REACH):
+                for u in range(REACH, width - REACH):
+                    total += min(abs(np.int64(on[v, u]) - np.int64(off[v - dv, u - du])), 20)
+            cost = total * (1 + 0.01 * (du * du + dv * dv))
+            if cost < best:
+                best = cost
+                shift[0], shift[1] = du, dv
+
+
+@compiled
 def _follow(off: Image, on: Image, shift: Array, steps: int, rows: int) -> None:
     """Improve shift (2,) in place: least squares of on(x) = off(x − shift), with Cauchy's weights against dots."""
     height, width = on.shape
+    start = shift.copy()
     for _ in range(steps):
         margin = int(max(abs(shift[0]), abs(shift[1]))) + 3
         if 3 * margin > height or 3 * margin > width:
@@ -109,9 +130,11 @@ def _follow(off: Image, on: Image, shift: Array, steps: int, rows: int) -> None:
                 vv += weight * gv * gv
                 ru -= weight * gu * rest
                 rv -= weight * gv * rest
-        # what lies along the only edge in sight moves no pixel: held at nothing
-        held = 3e-4 * (uu + vv)
+        # along the only edge in sight the images tell no shift: there it stays where it began
+        held = HELD * (uu + vv)
         uu, vv = uu + held, vv + held
+        ru += 0.5 * held * (start[0] - shift[0])
+        rv += 0.5 * held * (start[1] - shift[1])
         determinant = uu * vv - uv * uv
         step_u, step_v = 2 * (vv * ru - uv * rv) / determinant, 2 * (uu * rv - uv * ru) / determinant
         shift[0] += min(max(step_u, -1.0), 1.0)
