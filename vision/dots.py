@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 from vision.motion import halved, motion_between, shifted
-from vision.spot_kernels import LEAST_VARIANCE, REGISTRATION_PX, lights, spots_fitted
+from vision.spot_kernels import fit_spots, lights
 
 Array = NDArray[Any]  # of floats
 Peaks = NDArray[np.int64]
@@ -27,6 +27,8 @@ SHAPED = 16  # spots of which the shape is learnt
 SHAPE_REACH = 6  # px, half the square in which the shape is learnt
 BURNT_LEVEL = 90.0  # grey levels, first guess of a spot whose middle is burnt out
 REACHES = (4, 8)  # px, least and largest half square in which a spot is measured
+REGISTRATION_PX = 0.12  # how far laser-off and laser-on images may lie apart after their motion is made up for
+LEAST_VARIANCE = 0.1  # grey levels², of rounding
 APART = 4.0  # px, nearer to a stronger one a spot is part of it
 
 
@@ -165,7 +167,7 @@ def _measured(on: Image, off: Image | None, peaks: Peaks, motion: Array, shape: 
     light = _lights(on, off, peaks, motion, reach, None)
     found, quality = _started(light, reach), np.empty((len(peaks), 4))
     shapes = np.tile(shape, (len(peaks), 1))
-    spots_fitted(light.signal, light.variance, light.burnt, shapes, False, off is None, 4, found, quality)
+    fit_spots(light.signal, light.variance, light.burnt, shapes, False, 5, found, quality)
     # the fit's own residuals say how much of the claimed noise is true, as far as so few can
     weight = light.signal.shape[1] / 3
     scale = np.sqrt((20 + weight * quality[:, 3]) / (20 + weight))
@@ -191,9 +193,7 @@ def _shape(on: Image, off: Image | None, peaks: Peaks, motion: Array, shape: Arr
     """The shape (3,) that most of the strongest spots have, from `shape` on."""
     light = _lights(on, off, peaks, motion, SHAPE_REACH, None)
     shapes, quality = np.tile(shape, (len(peaks), 1)), np.empty((len(peaks), 4))
-    spots_fitted(
-        light.signal, light.variance, light.burnt, shapes, True, off is None, 5, _started(light, SHAPE_REACH), quality
-    )
+    fit_spots(light.signal, light.variance, light.burnt, shapes, True, 5, _started(light, SHAPE_REACH), quality)
     covariance = np.linalg.inv(shapes[:, [0, 1, 1, 2]].reshape(-1, 2, 2))
     return np.asarray(np.linalg.inv(np.median(covariance, axis=0))[[0, 0, 1], [0, 1, 1]])
 
