@@ -41,10 +41,12 @@ class RunningVehicle(Protocol):
 
 
 class VehicleNote(BaseModel):
-    """What a run leaves in its folder about its vehicle. token: tells it from another one on the same port."""
+    """What a run leaves in its folder about its vehicle. pid: of its process. token: tells it from another one on the
+    same port."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
+    pid: int
     truth_port: int
     system_address: str
     token: str

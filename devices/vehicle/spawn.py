@@ -39,7 +39,9 @@ class VehicleProcess:
     @property
     def note(self) -> VehicleNote:
         """What another program needs to take it up."""
-        return VehicleNote(truth_port=self.truth_port, system_address=self.system_address, token=self.token)
+        return VehicleNote(
+            pid=self.process.pid, truth_port=self.truth_port, system_address=self.system_address, token=self.token
+        )
 
     @property
     def alive(self) -> bool:

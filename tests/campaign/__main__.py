@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+from tests.campaign import kills
 from tests.campaign.flights import FLIGHTS, Flight, shortfalls
 
 ROOT = Path(__file__).parents[2]
@@ -32,12 +33,17 @@ def fly(flight: Flight, mission: str, record: Path, extra: list[str]) -> tuple[i
 def main() -> int:
     """Fly those flights whose names contain one of the words given; all by default."""
     parser = argparse.ArgumentParser(prog="make campaign ARGS=…", description=main.__doc__)
-    parser.add_argument("words", nargs="*")
+    parser.add_argument("words", nargs="*", help="`kill N`: kill the program at N random instants instead")
+    parser.add_argument("--seed", type=int, default=1, help="of the instants")
+    parser.add_argument("--flight", type=float, default=60.0, help="wall seconds over which they are spread")
     parser.add_argument("--mission", default="missions/v80_blade.yaml")
     parser.add_argument("--record", type=Path, default=ROOT / "logs" / "campaign")
     parser.add_argument("--lockstep", action="store_true")
     parser.add_argument("--speed", type=float)
     options = parser.parse_args()
+    if options.words[:1] == ["kill"]:
+        number = int(options.words[1]) if len(options.words) > 1 else 100
+        return 1 if kills.campaign(number, options.seed, options.flight, options.record / "kills") else 0
     extra = ["--lockstep"] if options.lockstep else []
     extra += ["--speed", str(options.speed)] if options.speed else []
     chosen = [f for f in FLIGHTS if not options.words or any(word in f.name for word in options.words)]
