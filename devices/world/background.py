@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.world.compiled import compiled
 from devices.world.settings import Light
+from vision.compiled import compiled
 
 TILE = 1024  # texels of a ground and a cloud tile, a power of two
 TEXEL_M = 1.0

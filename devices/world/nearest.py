@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.world.compiled import compiled
 from devices.world.mesh import Mesh
+from vision.compiled import compiled
 
 Array = NDArray[np.float64]
 

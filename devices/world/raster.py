@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.world.compiled import compiled
+from vision.compiled import compiled
 
 Array = NDArray[np.float64]
 NEAR_M = 0.05

@@ -5,8 +5,8 @@ the mission's telemetry on the executive's clock: laid over each other they tell
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,15 @@ class RunFiles:
     target_m: float | None
     tip_radius_m: float | None
 
+    def later(self, seconds: float) -> RunFiles:
+        """The same run so much later."""
+        return replace(
+            self,
+            flight=replace(self.flight, t=self.flight.t + seconds),
+            passes=tuple(Pass(one.start_s + seconds, one.end_s + seconds, one.side) for one in self.passes),
+            photographs=tuple(Photograph(one.stamp_s + seconds, one.side) for one in self.photographs),
+        )
+
     @classmethod
     def read(cls, folder: Path) -> RunFiles | None:
         """Read a run's folder; None where no simulated vehicle left its log or the mission names no turbine."""
@@ -59,7 +68,7 @@ class RunFiles:
             shape,
             _camera(document["rig"]),
             np.array(document["rig"].get("mount_m", (0.0, 0.0, 0.0)), float),
-            tuple(_passes(journal, follows, float(flight.t[-1]))),
+            tuple(_passes(journal, follows, _flown_until(flight, reported))),
             tuple(
                 Photograph(float(line["stamp_s"]), str(line["side"]))
                 for line in json_lines(folder / "frames" / "frames.jsonl")
@@ -68,6 +77,27 @@ class RunFiles:
             standoff[0] if standoff else None,
             _claimed_tip(journal),
         )
+
+
+def joined(runs: Sequence[RunFiles]) -> RunFiles | None:
+    """Runs that go on with one another as one. Each is laid after the end of the one before, on a clock of their own:
+    a vehicle that outlived its program was recorded while the next had not yet begun."""
+    if not runs:
+        return None
+    parts, end_s = [], -np.inf
+    for run in runs:
+        parts.append(run.later(max(0.0, end_s + 1.0 - float(run.flight.t[0]))))
+        end_s = float(parts[-1].flight.t[-1])
+    flights = [part.flight for part in parts]
+    flight = Flight(*(np.concatenate([getattr(one, f.name) for one in flights]) for f in fields(Flight)))
+    tips = [part.tip_radius_m for part in parts if part.tip_radius_m is not None]
+    return replace(
+        parts[-1],
+        flight=flight,
+        passes=tuple(one for part in parts for one in part.passes),
+        photographs=tuple(one for part in parts for one in part.photographs),
+        tip_radius_m=tips[-1] if tips else None,
+    )
 
 
 def _claimed_tip(journal: list[Mapping[str, Any]]) -> float | None:
@@ -124,6 +154,12 @@ def _follows(states: Mapping[str, Any], above: str) -> Iterator[tuple[str, Mappi
             if state.get("do") == "follow_edge":
                 yield path, state.get("with") or {}
             yield from _follows(state.get("states") or {}, path)
+
+
+def _flown_until(flight: Flight, reported: list[Mapping[str, str]]) -> float:
+    """When the program was last there: its vehicle may have gone on without it."""
+    end_s = float(flight.t[-1])
+    return min(end_s, float(reported[-1]["t"])) if reported else end_s
 
 
 def _passes(journal: list[Mapping[str, Any]], follows: Mapping[str, Any], end_s: float) -> Iterator[Pass]:

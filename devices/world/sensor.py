@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.world.compiled import compiled
 from devices.world.settings import Lens
 from vision.capture import Image
+from vision.compiled import compiled
 
 Array = NDArray[np.float64]
 NOISE_OFFSETS = 1 << 20

@@ -171,11 +171,12 @@ def _edge_seen(shape: TurbineShape, outline: Array, camera: Camera, pose: Camera
     return result
 
 
-def truth_of_run(folder: Path) -> Mapping[str, Any] | None:
-    """`flight_truth` of a run's folder; None where the folder does not hold what it takes (no simulated vehicle)."""
-    from devices.world.run_files import RunFiles
+def truth_of_run(*folders: Path) -> Mapping[str, Any] | None:
+    """`flight_truth` of a run's folder, or of several that go on with one another, oldest first; None where they do not
+    hold what it takes (no simulated vehicle)."""
+    from devices.world.run_files import RunFiles, joined
 
-    run = RunFiles.read(folder)
+    run = joined([run for folder in folders if (run := RunFiles.read(folder)) is not None])
     if run is None:
         return None
     return flight_truth(

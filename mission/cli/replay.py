@@ -22,6 +22,8 @@ def replay(
 ) -> None:
     """Play the recorded events through the same machine and report the first difference, if there is any.
 
+    A run that goes on with others is played after them.
+
     \b
     Examples:
       mission replay latest
@@ -36,16 +38,20 @@ def replay(
     from mission.executive.resume import ResumeError
     from mission.language.document import load
     from mission.record.folder import open_run
+    from mission.record.lineage import lineage
 
     folder = open_run(run, record)
     document = load(mission or folder.mission)
-    try:
-        difference, events, transitions = asyncio.run(_play(folder.journal, document, speed, begin, step))
-    except ResumeError as error:
-        raise CommandError(str(error), USAGE) from None
-    if difference is not None:
-        raise CommandError(difference, ABORTED)
-    print(f"{folder.name}: {events} events, {transitions} transitions, all as recorded")
+    for part in lineage(folder):
+        if part != folder and not part.journal.exists():
+            continue  # it was cut off before its first decision
+        try:
+            difference, events, transitions = asyncio.run(_play(part.journal, document, speed, begin, step))
+        except ResumeError as error:
+            raise CommandError(str(error), USAGE) from None
+        if difference is not None:
+            raise CommandError(difference, ABORTED)
+        print(f"{part.name}: {events} events, {transitions} transitions, all as recorded")
 
 
 async def _play(

@@ -55,7 +55,9 @@ def told(folder: RunFolder, summary: Mapping[str, Any]) -> list[str]:
         f"  record    {folder.path}",
         f"  report    {folder.report}",
     ]
-    if summary["outcome"] == "unfinished":
+    if summary["continues"]:
+        lines.insert(1, f"  goes on   with {', '.join(summary['continues'])}")
+    if summary["outcome"] in ("unfinished", "aborted"):
         lines.append(f"  go on     mission run --resume {folder.path}")
     if summary["outcome"] != "completed" and summary.get("why"):
         lines.insert(1, f"  because   {summary['why']}")

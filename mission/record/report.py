@@ -145,8 +145,8 @@ def _thumbs(folder: RunFolder, frames: Sequence[Mapping[str, Any]]) -> list[dict
     placed = sorted((line for line in frames if line.get("station_m") is not None), key=lambda line: line["station_m"])
     chosen = [placed[round(i * (len(placed) - 1) / (THUMBS - 1))] for i in range(THUMBS)] if placed else []
     thumbs = []
-    for line in {line["file"]: line for line in chosen}.values():
-        image = cv2.imread(str(folder.frames / Path(line["file"]).name))
+    for line in {line["path"]: line for line in chosen}.values():
+        image = cv2.imread(str(folder.path / line["path"]))
         if image is None:
             continue
         height = max(1, round(image.shape[0] * THUMB_PX / image.shape[1]))
@@ -154,7 +154,7 @@ def _thumbs(folder: RunFolder, frames: Sequence[Mapping[str, Any]]) -> list[dict
         data = base64.b64encode(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()).decode()
         scale = f", {line['mm_per_px']:.1f} mm/px" if line.get("mm_per_px") is not None else ""
         text = f"{line['station_m']:.1f} m{scale}"
-        thumbs.append({"file": Path(line["file"]).name, "data": f"data:image/jpeg;base64,{data}", "text": text})
+        thumbs.append({"path": line["path"], "data": f"data:image/jpeg;base64,{data}", "text": text})
     return thumbs
 
 

@@ -34,6 +34,7 @@ def summarise(history: RunHistory) -> Mapping[str, Any]:
     summary: dict[str, Any] = {
         "mission": history.mission.get("mission"),
         "run": history.folder.name,
+        "continues": [part.name for part in history.parts[:-1]],
         "outcome": end.get("outcome", "unfinished"),
         "final_state": end.get("state", last),
         "why": _why(history),
@@ -53,7 +54,7 @@ def summarise(history: RunHistory) -> Mapping[str, Any]:
         "frames": len(history.frames),
         "setpoints": _setpoints(history.setpoints),
     }
-    if history.folder.truth.is_file():
+    if any(part.truth.is_file() for part in history.parts):
         summary["truth"] = _truth(history)
     result: Mapping[str, Any] = plain(summary)
     return result
@@ -67,7 +68,7 @@ def _why(history: RunHistory) -> str | None:
     if (history.end or {}).get("why"):
         return str((history.end or {})["why"])
     said: Mapping[str, Any] = {}
-    for line in history.journal:
+    for line in history.journals[-1]:
         if line["kind"] == "event":
             said = line
         elif line["kind"] == "transition" and str(line["to"]).partition(".")[0] in (
@@ -177,6 +178,6 @@ def _truth(history: RunHistory) -> Mapping[str, Any] | None:
     from devices.world.truth import truth_of_run
 
     try:
-        return truth_of_run(history.folder.path)
+        return truth_of_run(*(part.path for part in history.parts))
     except (ValueError, KeyError, TypeError, IndexError):
         return None  # torn files of a killed run
