@@ -1,5 +1,10 @@
-"""The one way the eye's inner loops are compiled: cached on disk, releasing the interpreter lock, IEEE arithmetic in
-the order written, so that the same input gives the same output bit for bit."""
+"""The one way inner loops are compiled, the eye's and the simulated world's: cached on disk, releasing the interpreter
+lock, IEEE arithmetic in the order written, so that the same input gives the same output bit for bit.
+
+What is kept on disk is compiled again when its own module changes, not when another does: a kernel calls only kernels
+of its module. Where no folder can be written to (neither beside the module nor the user's cache), every process
+compiles for itself.
+"""
 
 from __future__ import annotations
 
@@ -13,5 +18,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def compiled(function: F) -> F:
     """A function of arrays and numbers as machine code, from its first call on."""
-    kernel: F = numba.njit(cache=True, nogil=True)(function)
+    kernel: F
+    try:
+        kernel = numba.njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # numba found nowhere to keep it
+        kernel = numba.njit(nogil=True)(function)
     return kernel

@@ -74,6 +74,8 @@ def fly(options: FlightOptions) -> FlightResult:
     """
     from mission.record.folder import RunFolder
     from mission.record.run_log import RunLog
+    from vision.pipeline import Eye
+    from vision.warm_up import warm_up
 
     past = None if options.resume is None else last_of(RunFolder(options.resume), options.mission)
     knowledge = None if past is None or past.folder is None else read_knowledge(past.folder)
@@ -83,6 +85,7 @@ def fly(options: FlightOptions) -> FlightResult:
         with lockstep_stage(options, start_s) if options.lockstep else wall_stage(options, start_s) as stage:
             if stage.world is not None:
                 _ = stage.world.renderer  # drawn for the first time before anything flies
+            warm_up(Eye(stage.rig.geometry))  # and compiled: that takes seconds once on a machine
             with asyncio.Runner(loop_factory=stage.loop_factory) as runner:
                 return runner.run(_fly(options, stage, past, knowledge, log.logger))
     finally:

@@ -1,0 +1,79 @@
+"""Lets an eye look at a drawn blade before anything flies, so that its inner loops are compiled by then."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.camera import Camera, RigGeometry
+from vision.capture import Image, StereoFrames
+from vision.grid import expected_points
+from vision.observation import BladeObservation
+from vision.pipeline import Eye
+
+Array = NDArray[Any]  # of floats
+
+DISTANCE_M = 3.0
+HALF_WIDTH = 0.55  # of the reach of the laser's grid to each side: where the blade's edges are
+BLADE, BACKGROUND, DOT = 170.0, 90.0, 70.0  # grey levels, and what a dot adds to green
+DOT_PX = 1.6  # standard deviation of a dot at working size
+
+
+def warm_up(eye: Eye) -> BladeObservation:
+    """What the eye says of the specimen; takes seconds when its inner loops are not compiled yet, and compiled ones are
+    kept on disk."""
+    return eye.observe(specimen(eye.geometry, eye.factor))
+
+
+def specimen(geometry: RigGeometry, factor: int = 1) -> StereoFrames:
+    """Four images (h, w, 3) of an upright blade that ends in view, square before the left camera, as the rig's cameras
+    would see it; drawn at 1 / factor of their size."""
+    stereo, laser = geometry.stereo.shrunk(factor), geometry.laser
+    dots = np.empty((0, 3))
+    middle, reach = np.zeros(2), np.full(2, 0.25 * DISTANCE_M)
+    if laser is not None:
+        dots = expected_points(laser, DISTANCE_M, np.zeros(2))
+        dots = dots[np.isfinite(dots[:, 0])]
+        middle, reach = np.median(dots[:, 1:], axis=0), np.ptp(dots[:, 1:], axis=0) / 2
+    tip = middle[1] - HALF_WIDTH * reach[1]
+
+    def on_blade(points: Array) -> NDArray[np.bool_]:
+        inside = np.abs(points[:, 1] - middle[0]) < HALF_WIDTH * reach[0]
+        return np.asarray(inside & (points[:, 2] > tip), np.bool_)
+
+    dots = dots[on_blade(dots)]
+    images: list[Image] = []
+    for camera, full, rotation, translation in (
+        (stereo.left, geometry.stereo.left, np.eye(3), np.zeros(3)),
+        (stereo.right, geometry.stereo.right, stereo.rotation, stereo.translation),
+    ):
+        v, u = np.mgrid[: camera.height, : camera.width]
+        rays = camera.rays(np.column_stack([u.ravel(), v.ravel()])) @ rotation
+        lens = -translation @ rotation
+        points = lens + rays * ((DISTANCE_M - lens[0]) / rays[:, :1])
+        plain = np.where(on_blade(points), BLADE, BACKGROUND).reshape(camera.height, camera.width)
+        lit = plain + DOT * _spots(camera, dots @ rotation.T + translation)
+        images += [_enlarged(plain, plain, factor, full), _enlarged(plain, lit, factor, full)]
+    return StereoFrames(0.0, images[0], images[2], images[1], images[3])
+
+
+def _spots(camera: Camera, dots: Array) -> Array:
+    """Gaussian spots (h, w), of height one, where a camera sees dots (n, 3)."""
+    uv = camera.project(dots)
+    uv = uv[np.isfinite(uv[:, 0])]
+    across, down = (
+        np.exp(-0.5 * ((np.arange(size) - uv[:, axis, None]) / DOT_PX) ** 2)
+        for axis, size in enumerate((camera.width, camera.height))
+    )
+    light: Array = down.T @ across
+    return light
+
+
+def _enlarged(grey: Array, green: Array, factor: int, camera: Camera) -> Image:
+    """A BGR image of the camera's size, each pixel repeated, the last ones to the border."""
+    image = np.stack([grey, green, grey], axis=2).clip(0, 255).astype(np.uint8)
+    image = image.repeat(factor, axis=0).repeat(factor, axis=1)
+    missing = ((0, camera.height - image.shape[0]), (0, camera.width - image.shape[1]), (0, 0))
+    return np.ascontiguousarray(np.pad(image, missing, mode="edge"))
