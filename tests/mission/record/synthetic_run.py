@@ -83,15 +83,21 @@ def images(stamp_s: float) -> StereoFrames:
     return StereoFrames(stamp_s, picture, None, picture, None, CameraPose(np.zeros(3), np.eye(3)))
 
 
-def fly(folder: RunFolder, until_s: float = 160.0, distance_m: float = 3.1, skip: tuple[float, float] = (0, 0)) -> None:
+def fly(
+    folder: RunFolder,
+    until_s: float = 160.0,
+    distance_m: float = 3.1,
+    skip: tuple[float, float] = (0, 0),
+    from_s: float = 60.0,
+) -> None:
     """Record the two passes, five cycles a second, `distance_m` away; no station within `skip` is ever accepted."""
     log = RunLog(folder.log)
     recorder = RunRecorder(folder, CAMERA, log.logger, inline=True)
     log.logger.info("run_started")
     seen = BladeObservation(0.0, True, distance_m=distance_m, distance_sigma_m=0.03, nearest_m=3.0, sharpness=0.8)
     refused = BladeObservation(0.0, False, reasons=("too few dots",), sharpness=0.8)
-    for step in range(round((until_s - 60.0) * 5)):
-        now = 60.0 + step / 5
+    for step in range(round((until_s - from_s) * 5)):
+        now = from_s + step / 5
         side, along = ("leading", (now - 60.0) / 50.0) if now < 110.0 else ("trailing", 1.0 - (now - 110.0) / 50.0)
         station = ROOT_M + along * (TIP_M - ROOT_M)
         believed = estimate(now, station, distance_m)
@@ -105,9 +111,12 @@ def fly(folder: RunFolder, until_s: float = 160.0, distance_m: float = 3.1, skip
     log.close()
 
 
-def write_journal(folder: RunFolder, until_s: float = 1e9) -> None:
-    """The journal of a completed flight, or its beginning."""
+def write_journal(folder: RunFolder, until_s: float = 1e9, goes_on_in: str | None = None) -> None:
+    """The journal of a completed flight, or its beginning; or what follows after `until_s`, going on in a state."""
     lines = [line for line in JOURNAL if line["t"] <= until_s]
+    if goes_on_in is not None:
+        begins = {**JOURNAL[0], "t": until_s, "resumed": True, "state": goes_on_in}
+        lines = [begins, *(line for line in JOURNAL if line["t"] > until_s)]
     folder.journal.write_text("".join(json.dumps({"seq": i, **line}) + "\n" for i, line in enumerate(lines)), "utf-8")
 
 
