@@ -13,5 +13,6 @@ class FileModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
-Vector = tuple[float, float, float]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
+Near = Annotated[float, Field(ge=-5, le=5)]
+"""Metres between parts of one vehicle."""

@@ -46,7 +46,7 @@ def examine(path: Path, overrides: Sequence[str] = (), rig: str | None = None, c
     problems = sources.problems
     mission: Mission | None = None
     document = sources.read(path)
-    if document is not None:
+    if document is not None and not sources.incomplete:
         root = resolved(document, path, overrides, rig, sources)
         if root is not None:
             mission = mission_of(root, path, problems)

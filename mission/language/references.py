@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 from mission.language.diagnostics import Diagnostic, near_or_choices
 from mission.language.location import Location
 from mission.language.tree import Entry, Items, Node, Scalar, Table
+from mission.language.yaml_tree import DEEPEST, MOST_NODES
 
 _REFERENCE = re.compile(r"\$\{(?P<name>[^{}]*)\}")
 _NAME = re.compile(r"[A-Za-z_]\w*")
+_LONGEST = 10_000
 
 
 @dataclass
@@ -44,12 +46,15 @@ class _Resolver:
     def __init__(self, problems: list[Diagnostic]) -> None:
         self.problems = problems
         self.scopes: list[_Scope] = []
+        self.depth = 0
 
     def inside(self, node: Node, scope: _Scope | None) -> Node:
         if isinstance(node, Scalar):
             return self.scalar(node, scope)
         if isinstance(node, Items):
-            return Items(tuple(self.inside(item, scope) for item in node.items), node.location, node.size)
+            items = tuple(self.inside(item, scope) for item in node.items)
+            size = self.bounded(1 + sum(item.size for item in items), node.location)
+            return Items(items if size else (), node.location, size)
         parameters = node.get("parameters")
         inner = scope
         if isinstance(parameters, Table):
@@ -59,10 +64,19 @@ class _Resolver:
         for key, entry in node.entries.items():
             if key == "parameters" and isinstance(parameters, Table) and inner is not None:
                 values = {name: Entry(e.key, self.parameter(name, inner)) for name, e in parameters.entries.items()}
-                entries[key] = Entry(entry.key, Table(values, parameters.location, parameters.size))
+                size = self.bounded(1 + sum(value.node.size for value in values.values()), parameters.location)
+                entries[key] = Entry(entry.key, Table(values if size else {}, parameters.location, size))
             else:
                 entries[key] = Entry(entry.key, self.inside(entry.node, inner))
-        return Table(entries, node.location, node.size)
+        size = self.bounded(1 + sum(entry.node.size for entry in entries.values()), node.location)
+        return Table(entries if size else {}, node.location, size)
+
+    def bounded(self, size: int, place: Location) -> int:
+        """The same size, 0 with a finding where references make it grow beyond what a file may hold."""
+        if size <= MOST_NODES:
+            return size
+        self.problems.append(Diagnostic(place, "M006", f"more than {MOST_NODES} values after references are replaced"))
+        return 0
 
     def parameter(self, name: str, scope: _Scope) -> Node:
         if name not in scope.resolved:
@@ -70,8 +84,14 @@ class _Resolver:
             if name in scope.resolving:
                 self.problems.append(Diagnostic(entry.key, "M105", f"the parameter {name!r} leads back to itself"))
                 return Scalar(None, entry.node.location)
+            if self.depth >= DEEPEST:
+                message = f"references lead through more than {DEEPEST} parameters"
+                self.problems.append(Diagnostic(entry.key, "M105", message))
+                return Scalar(None, entry.node.location)
             scope.resolving.append(name)
+            self.depth += 1
             scope.resolved[name] = self.inside(entry.node, scope)
+            self.depth -= 1
             scope.resolving.remove(name)
         return scope.resolved[name]
 
@@ -100,7 +120,10 @@ class _Resolver:
             inserted = value.value if isinstance(value, Scalar) else ""
             parts += [text[end : match.start()], str(inserted).lower() if isinstance(inserted, bool) else str(inserted)]
             end = match.end()
-        return Scalar("".join([*parts, text[end:]]), node.location, node.offset)
+        whole = "".join([*parts, text[end:]])
+        if len(whole) > _LONGEST:
+            self.problems.append(Diagnostic(node.location, "M006", f"a text of more than {_LONGEST} characters"))
+        return Scalar(whole[:_LONGEST], node.location, node.offset)
 
     def looked_up(self, name: str, place: Location, scope: _Scope | None) -> Node | None:
         if not _NAME.fullmatch(name):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import difflib
+import re
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from devices.camera_drivers import DRIVERS
-from mission.language.file_model import Degrees, FileModel, Vector
+from mission.language.file_model import Degrees, FileModel, Near
 
 
 class CameraSection(FileModel):
@@ -28,8 +30,10 @@ class LaserSection(FileModel):
     rows: int = Field(11, ge=2, le=101, description="Dots from top to bottom.")
     columns: int = Field(11, ge=2, le=101, description="Dots from left to right.")
     fan_deg: float = Field(28.2, gt=1, le=120, description="Full angle of the grid, across and down.")
-    position_m: Vector = Field((0.0, 0.0, 0.0), description="In the left camera's frame: forward, right, down.")
-    rotation_deg: Vector = Field(
+    position_m: tuple[Near, Near, Near] = Field(
+        (0.0, 0.0, 0.0), description="In the left camera's frame: forward, right, down."
+    )
+    rotation_deg: tuple[Degrees, Degrees, Degrees] = Field(
         (0.0, 0.0, 0.0), description="Roll, pitch, yaw of the laser's axes in the left camera's frame."
     )
 
@@ -49,7 +53,9 @@ class RigFile(FileModel):
     speed: float = Field(
         1.0, gt=0, le=100, description="Mission seconds per wall second; only a simulator can be faster."
     )
-    mount_m: Vector = Field((0.0, 0.0, 0.0), description="The left lens in body axes: forward, right, down.")
+    mount_m: tuple[Near, Near, Near] = Field(
+        (0.0, 0.0, 0.0), description="The left lens in body axes: forward, right, down."
+    )
     camera: CameraSection | None = Field(None, description="The stereo pair by its data sheet.")
     camchain: str | None = Field(None, description="The stereo pair as calibrated: a Kalibr camchain beside this file.")
     laser: LaserSection | None = Field(None, description="None: a rig without structured light.")
@@ -68,7 +74,7 @@ class RigFile(FileModel):
     sources: tuple[int | str, ...] = Field(
         (), description="The left and the right camera for its driver: numbers, devices, files or addresses."
     )
-    parameters: dict[str, float] = Field(
+    parameters: dict[str, Annotated[float, Field(ge=-1e6, le=1e6)]] = Field(
         default_factory=dict,
         description="Parameters that a simulated autopilot is given; COM_OF_LOSS_T in wall seconds.",
     )
@@ -89,6 +95,9 @@ class RigFile(FileModel):
             raise ValueError("speed must be 1 for real hardware")
         if self.parameters and self.kind not in ("simulated", "px4_sitl"):
             raise ValueError(f"parameters are for simulated autopilots: set those of kind {self.kind} in a GCS")
+        for name in self.parameters:
+            if hint := _unknown_parameter(name, simulated=self.kind == "simulated"):
+                raise ValueError(f"{name} is no parameter of the autopilot{hint}")
         if self.camera_driver is not None and self.kind != "hardware":
             raise ValueError("camera_driver belongs to kind hardware")
         if self.camera_driver is not None and self.camera_driver not in DRIVERS:
@@ -96,3 +105,22 @@ class RigFile(FileModel):
         if len(self.sources) != (2 if self.camera_driver == "opencv" else 0):
             raise ValueError("sources names two cameras, left and right, for a camera_driver that opens them")
         return self
+
+
+def _unknown_parameter(name: str, *, simulated: bool) -> str:
+    """What to say about a parameter's name; empty where it may be right. PX4 has more than the simulated vehicle."""
+    from devices.vehicle.parameters import DEFAULTS
+
+    if name in DEFAULTS:
+        return ""
+    near = difflib.get_close_matches(name, DEFAULTS, n=1, cutoff=0.85)
+    if near:
+        return f": did you mean {near[0]}?"
+    px4 = re.fullmatch(r"[A-Z][A-Z0-9_]{1,15}", name)
+    return (
+        ""
+        if px4 and not simulated
+        else f", which has {', '.join(list(DEFAULTS)[:6])}, …"
+        if simulated
+        else ": PX4 writes them as COM_OF_LOSS_T"
+    )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mission.language.diagnostics import Diagnostic, printable, suggestion
 from mission.language.location import Location
+from mission.language.shapes import misshapen
 from mission.language.tree import Entry, Items, Node, Scalar, Table, merge
 from mission.language.yaml_text import LONGEST_TEXT, UnreadableError, allowances, parse
 
@@ -22,6 +23,7 @@ class Sources:
     root: Path
     problems: list[Diagnostic] = field(default_factory=list)
     allowed: dict[str, dict[int, tuple[str, ...]]] = field(default_factory=dict)
+    incomplete: bool = False  # a file that should lie below is not there: whatever else is missing may be in it
     _reads: int = 0
 
     def read(self, path: Path, asked: Location | None = None) -> Table | None:
@@ -58,6 +60,8 @@ class Sources:
         self._reads += 1
         try:
             if self._reads > _MOST_FILES:
+                if self._reads > _MOST_FILES + 1:
+                    return None
                 raise UnreadableError(
                     Diagnostic(asked or Location(file, 1, 1), "M102", f"more than {_MOST_FILES} files are included")
                 )
@@ -69,6 +73,7 @@ class Sources:
             text = read_text(path, asked)
             self.allowed[file] = allowances(text)
             table = parse(text, file, self.problems)
+            self.problems.extend(misshapen(table))
         except UnreadableError as error:
             self.problems.append(error.diagnostic)
             return None
@@ -85,7 +90,9 @@ class Sources:
             for scalar in self._names(node.get(key), key):
                 path = self.named(scalar, folder)
                 table = self._read(path, scalar.location, chain) if path else None
-                if table is not None:
+                if table is None:
+                    self.incomplete = True
+                else:
                     below = table if below is None else merge(below, table)
         return own if below is None else merge(below, own)
 
@@ -98,8 +105,9 @@ class Sources:
         if node is None:
             return []
         nodes = node.items if isinstance(node, Items) else (node,)
-        for item in nodes:
+        for item in nodes or (node,):
             if not isinstance(item, Scalar):
+                self.incomplete = True
                 self.problems.append(
                     Diagnostic(item.location, "M203", f"{key} takes the name of a file, or a list of names")
                 )
@@ -129,7 +137,7 @@ def read_text(path: Path, asked: Location | None = None) -> str:
     if len(data) > LONGEST_TEXT:
         raise UnreadableError(Diagnostic(place, "M001", f"the file is larger than {LONGEST_TEXT // 1000} kB"))
     try:
-        return data.decode("utf-8-sig")
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         column = error.start - (data.rfind(b"\n", 0, error.start) + 1) + 1
@@ -176,7 +184,8 @@ def _no_file(path: Path) -> str:
 
 def _near_file(path: Path) -> str:
     try:
-        names = [other.name for other in path.parent.iterdir() if other.suffix in (".yaml", ".yml")][:200]
+        near = [other for other in path.parent.iterdir() if other.suffix in (".yaml", ".yml")][:200]
+        names = [other.name for other in near if other.is_file()]
     except (OSError, ValueError):
         return ""
     return suggestion(path.name, names)

@@ -11,6 +11,7 @@ from mission.language.diagnostics import Diagnostic, near_or_choices
 from mission.language.document import OUTCOMES, State, enclosing
 from mission.language.limits import Limits
 from mission.language.location import Location
+from mission.language.shapes import no_state
 from mission.language.transitions_in import TransitionReader, read_flag, read_number
 from mission.language.tree import Node, Scalar, Table, kind, merge
 from mission.language.typed import typed
@@ -117,9 +118,7 @@ class StatesReader:
                 self.report(entry.key, "M207", f"{name!r} cannot name a state", "letters, digits and _, at most 40")
                 continue
             if not isinstance(entry.node, Table):
-                self.report(
-                    entry.node.location, "M203", f"the state {name!r} must be a mapping, not {kind(entry.node)}"
-                )
+                self.problems.append(no_state(name, entry.node))
                 continue
             path = f"{parent}.{name}" if parent else name
             paths.append(path)
@@ -127,10 +126,8 @@ class StatesReader:
                 self.report(entry.key, "M006", f"a mission may have {_MOST_STATES} states at most")
                 break
             self.found[path] = _Found(path, parent, entry.node, entry.key, ())
-            inner = entry.node.get("states")
-            if inner is not None:
-                children = self.collect(inner, path)
-                self.found[path] = _Found(path, parent, entry.node, entry.key, children)
+            if (inner := entry.node.get("states")) is not None:
+                self.found[path] = _Found(path, parent, entry.node, entry.key, self.collect(inner, path))
         return tuple(paths)
 
     def state(self, found: _Found, reader: TransitionReader) -> State:

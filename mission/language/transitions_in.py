@@ -8,6 +8,7 @@ from mission.language.conditions import Condition, ConditionError, parse
 from mission.language.diagnostics import Diagnostic, choices, near_or_choices, suggestion
 from mission.language.document import History, Transition, enclosing
 from mission.language.location import Location
+from mission.language.shapes import no_answers
 from mission.language.tree import Items, Node, Scalar, Table, kind
 
 FIELDS = {
@@ -37,7 +38,7 @@ class TransitionReader:
     def read(self, node: Node, source: str) -> tuple[Transition, ...]:
         """All transitions under one `on:`; what is wrong is reported and left out."""
         if not isinstance(node, Table):
-            self.report(node.location, "M203", f"on must map events to states, not {kind(node)}", "as in {done: land}")
+            self.problems.append(no_answers(node))
             return ()
         found: list[Transition] = []
         for event, entry in node.entries.items():

@@ -46,8 +46,8 @@ def _finding(model: type[BaseModel], root: Table, place: Location, what: str, de
         return Diagnostic(location, "M201", f"{_inside(what, path[:-1])} needs {path[-1]!r}{_meaning(model, path)}")
     node, location = descend(root, path)
     used = f"; used at {node.used_at}" if isinstance(node, Scalar) and node.used_at else ""
-    if not isinstance(node, Table):
-        location = node.location
+    if not isinstance(node, Table) or node.location.file != location.file or node.location < location:
+        location = node.location  # for a mapping its key, unless a reference put it there
     if kind_of_error == "extra_forbidden":
         _, location = descend(root, path)
         known = _fields(model, path[:-1])

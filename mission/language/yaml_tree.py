@@ -11,13 +11,15 @@ import yaml
 
 from mission.language.diagnostics import Diagnostic, suggestion
 from mission.language.location import Location
+from mission.language.syntax import syntax_error
 from mission.language.tree import Entry, Items, Node, Plain, Scalar, Table
 
 MOST_NODES = 20_000
 DEEPEST = 40
 
-_INTEGER = re.compile(r"[-+]?\d+")
-_FLOAT = re.compile(r"[-+]?(\.\d+|\d+(\.\d*)?)([eE][-+]?\d+)?")
+# A leading zero is octal to some readers of YAML and decimal to others: not a number here.
+_INTEGER = re.compile(r"[-+]?(0|[1-9]\d*)")
+_FLOAT = re.compile(r"[-+]?(\.\d+|(0|[1-9]\d*)(\.\d*)?)([eE][-+]?\d+)?")
 _SPECIAL: dict[str, Plain] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -26,8 +28,9 @@ _SPECIAL: dict[str, Plain] = {
     "-.inf": float("-inf"),
     ".nan": float("nan"),
 }
+# Of Unicode: line breaks that only some programs see, and marks that change the direction of what is shown.
 CONTROL = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
 )
 
 # The C parser is ten times faster; a build of PyYAML without libyaml still works.
@@ -49,15 +52,6 @@ def scalar_value(text: str) -> Plain:
     if _INTEGER.fullmatch(text):
         return int(text) if len(text) < 25 else float(text)
     return float(text) if _FLOAT.fullmatch(text) else text
-
-
-def _keyless_line_above(lines: list[str], number: int) -> int | None:
-    """The line before `number` with something on it, where it is no `key: value` line; counted from 1."""
-    for above in range(number - 1, 0, -1):
-        content = lines[above - 1].strip()
-        if content and not content.startswith("#"):
-            return None if ":" in content else above
-    return None
 
 
 @dataclass
@@ -85,6 +79,7 @@ class TreeBuilder:
         self.stack: list[_Open] = []
         self.root: Node | None = None
         self.nodes = 0
+        self.wide: tuple[Location, int] | None = None  # the last text over several lines, and its last
 
     def build(self, text: str) -> Node | None:
         documents = 0
@@ -107,26 +102,9 @@ class TreeBuilder:
         try:
             yield from yaml.parse(text, Loader=_Loader)
         except yaml.MarkedYAMLError as error:
-            raise self.syntax(error, text) from None
+            raise UnreadableError(syntax_error(error, text, self.file, self.wide, self.lines)) from None
         except yaml.YAMLError as error:
             raise self.stop(Location(self.file, 1, 1), "M002", str(error).splitlines()[0]) from None
-
-    def syntax(self, error: yaml.MarkedYAMLError, text: str) -> UnreadableError:
-        # An unclosed bracket or quote, or a key without colon, is noticed lines later: the context knows where it
-        # began.
-        context, problem = error.context or "", error.problem or "not YAML"
-        began = any(word in context for word in ("flow", "quoted", "simple key", "anchor", "alias"))
-        mark = error.context_mark if began and error.context_mark else error.problem_mark or error.context_mark
-        place = self.place(mark)
-        lines = text.splitlines()
-        if place.line > len(lines) > 0:
-            place = Location(self.file, len(lines), 1)
-        if problem.startswith("mapping values") and (keyless := _keyless_line_above(lines, place.line)):
-            place, problem = (
-                Location(self.file, keyless, 1),
-                "a `:` is missing here, or the next line is indented too far",
-            )
-        return self.stop(place, "M002", f"{context + ': ' if context else ''}{problem}")
 
     def place(self, mark: Any) -> Location:
         if not self.lines:
@@ -152,6 +130,9 @@ class TreeBuilder:
         place = self.place(event.start_mark)
         self.refuse_tag(event.tag, place)
         unquoted = event.style is None or event.style == ""
+        quoted = event.style in ("'", '"')
+        if quoted and event.end_mark is not None and self.place(event.end_mark).line > place.line:
+            self.wide = (place, event.end_mark.line + 1)
         text = str(event.value)
         if CONTROL.search(text):
             self.problems.append(Diagnostic(place, "M007", "a control character is written in this text"))
