@@ -17,6 +17,7 @@ LARGEST_MOTION = 14.0  # px between laser-off and laser-on
 SMALLEST_MOTION = 0.1  # px; less is not told from none
 COARSEST = 8  # the coarsest level is the image's size over this
 REACH = 2  # px of the coarsest level, beyond the largest motion
+STEEP = 8  # grey levels over two pixels, from which a pixel tells a shift
 HELD = 3e-3  # weight of a level's start against the level's own information
 GAIN = 0.97  # a motion must bring the images nearer to each other by this factor
 
@@ -73,15 +74,22 @@ def _mean_difference(off: Image, on: Image, du: float, dv: float) -> float:
     margin = int(max(abs(du), abs(dv))) + 2
     shift_u, shift_v = int(np.floor(-du)), int(np.floor(-dv))
     part_u, part_v = np.float32(-du - shift_u), np.float32(-dv - shift_v)
-    total, count = np.float64(0), 0
+    one = np.float32(1)
+    c00, c01 = (one - part_u) * (one - part_v), part_u * (one - part_v)
+    c10, c11 = (one - part_u) * part_v, part_u * part_v
+    total, count = 0.0, width - 2 * margin
     for v in range(margin, height - margin):
-        for u in range(margin, width - margin):
-            a, b = v + shift_v, u + shift_u
-            upper = (1 - part_u) * off[a, b] + part_u * off[a, b + 1]
-            lower = (1 - part_u) * off[a + 1, b] + part_u * off[a + 1, b + 1]
-            total += min(abs(on[v, u] - (1 - part_v) * upper - part_v * lower), 20.0)
-            count += 1
-    return total / max(count, 1)
+        here = on[v, margin:]
+        upper, lower = off[v + shift_v, margin + shift_u :], off[v + shift_v + 1, margin + shift_u :]
+        upper_next, lower_next = upper[1:], lower[1:]
+        row = np.int32(0)
+        for i in range(count):
+            value = c00 * np.float32(upper[i]) + c01 * np.float32(upper_next[i])
+            value += c10 * np.float32(lower[i]) + c11 * np.float32(lower_next[i])
+            row += np.int32(min(abs(np.float32(here[i]) - value), np.float32(20)) * np.float32(64))
+        total += row
+    mean: float = total / 64 / max(count * (height - 2 * margin), 1)
+    return mean
 
 
 @compiled
@@ -92,10 +100,13 @@ def _search(off: Image, on: Image, shift: Array) -> None:
     best = np.inf
     for dv in range(-REACH, REACH + 1):
         for du in range(-REACH, REACH + 1):
-            total = 0
+            total = 0.0
             for v in range(REACH, height - REACH):
-                for u in range(REACH, width - REACH):
-                    total += min(abs(np.int64(on[v, u]) - np.int64(off[v - dv, u - du])), 20)
+                here, there = on[v, REACH:], off[v - dv, REACH - du :]
+                row = np.int32(0)
+                for i in range(width - 2 * REACH):
+                    row += min(abs(np.int32(here[i]) - np.int32(there[i])), np.int32(20))
+                total += row
             cost = total * (1 + 0.01 * (du * du + dv * dv))
             if cost < best:
                 best = cost
@@ -104,40 +115,52 @@ def _search(off: Image, on: Image, shift: Array) -> None:
 
 @compiled
 def _follow(off: Image, on: Image, shift: Array, steps: int, rows: int) -> None:
-    """Improve shift (2,) in place: least squares of on(x) = off(x − shift), with Cauchy's weights against dots."""
+    """Improve shift (2,) in place: least squares of on(x) = off(x − shift) on every so many rows, where `on` is steep,
+    with Cauchy's weights against dots."""
     height, width = on.shape
-    start = shift.copy()
+    margin = int(max(abs(shift[0]), abs(shift[1]))) + 6
+    if 3 * margin > height or 3 * margin > width:
+        return
+    places = np.empty((((height - 2 * margin) // rows + 1) * (width - 2 * margin), 2), np.int32)
+    slopes = np.empty((len(places), 2), np.float32)
+    count = 0
+    for v in range(margin, height - margin, rows):
+        for u in range(margin, width - margin):
+            gu = np.int32(on[v, u + 1]) - np.int32(on[v, u - 1])
+            gv = np.int32(on[v + 1, u]) - np.int32(on[v - 1, u])
+            if gu * gu + gv * gv >= STEEP * STEEP:
+                places[count, 0], places[count, 1] = v, u
+                slopes[count, 0], slopes[count, 1] = gu, gv
+                count += 1
+    one = np.float32(1)
+    start_u, start_v = shift[0], shift[1]
     for _ in range(steps):
-        margin = int(max(abs(shift[0]), abs(shift[1]))) + 3
-        if 3 * margin > height or 3 * margin > width:
-            return
         shift_u, shift_v = int(np.floor(-shift[0])), int(np.floor(-shift[1]))
         part_u, part_v = np.float32(-shift[0] - shift_u), np.float32(-shift[1] - shift_v)
-        corner = (1 - part_u) * (1 - part_v), part_u * (1 - part_v), (1 - part_u) * part_v, part_u * part_v
+        c00, c01 = (one - part_u) * (one - part_v), part_u * (one - part_v)
+        c10, c11 = (one - part_u) * part_v, part_u * part_v
         uu, uv, vv, ru, rv = 1e-3, 0.0, 1e-3, 0.0, 0.0
-        for v in range(margin, height - margin, rows):
-            for u in range(margin, width - margin):
-                a, b = v + shift_v, u + shift_u
-                gu = np.float32(on[v, u + 1]) - np.float32(on[v, u - 1])
-                gv = np.float32(on[v + 1, u]) - np.float32(on[v - 1, u])
-                if gu * gu + gv * gv < 64:
-                    continue
-                moved = corner[0] * off[a, b] + corner[1] * off[a, b + 1] + corner[2] * off[a + 1, b]
-                rest = on[v, u] - moved - corner[3] * off[a + 1, b + 1]
-                weight = 1 / (1 + rest * rest / 100)
-                uu += weight * gu * gu
-                uv += weight * gu * gv
-                vv += weight * gv * gv
-                ru -= weight * gu * rest
-                rv -= weight * gv * rest
+        for k in range(count):
+            v, u, gu, gv = places[k, 0], places[k, 1], slopes[k, 0], slopes[k, 1]
+            a, b = v + shift_v, u + shift_u
+            moved = c00 * np.float32(off[a, b]) + c01 * np.float32(off[a, b + 1])
+            moved += c10 * np.float32(off[a + 1, b]) + c11 * np.float32(off[a + 1, b + 1])
+            rest = np.float32(on[v, u]) - moved
+            weight = one / (one + rest * rest * np.float32(0.01))
+            uu += weight * gu * gu
+            uv += weight * gu * gv
+            vv += weight * gv * gv
+            ru -= weight * gu * rest
+            rv -= weight * gv * rest
         # along the only edge in sight the images tell no shift: there it stays where it began
         held = HELD * (uu + vv)
         uu, vv = uu + held, vv + held
-        ru += 0.5 * held * (start[0] - shift[0])
-        rv += 0.5 * held * (start[1] - shift[1])
+        ru += 0.5 * held * (start_u - shift[0])
+        rv += 0.5 * held * (start_v - shift[1])
         determinant = uu * vv - uv * uv
         step_u, step_v = 2 * (vv * ru - uv * rv) / determinant, 2 * (uu * rv - uv * ru) / determinant
-        shift[0] += min(max(step_u, -1.0), 1.0)
-        shift[1] += min(max(step_v, -1.0), 1.0)
+        bound = margin - 2.0
+        shift[0] = min(max(shift[0] + min(max(step_u, -1.0), 1.0), -bound), bound)
+        shift[1] = min(max(shift[1] + min(max(step_v, -1.0), 1.0), -bound), bound)
         if abs(step_u) + abs(step_v) < 0.01:
             return

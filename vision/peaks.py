@@ -1,0 +1,157 @@
+"""Where a laser may have made a spot: peaks of the light gained between a laser-off and a laser-on image, or, in a
+single laser-on image, of what stands above all its surroundings. Half-size images; compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.capture import Image
+from vision.compiled import compiled
+
+Array = NDArray[Any]  # of floats
+Peaks = NDArray[np.int64]
+
+RING = 4  # px of the half-size image, where a dot of a single laser-on image must have fallen off on every side
+SIGNIFICANT = 4.0  # standard deviations, from which a gain of light is no noise
+LEAST_NOISE = 0.1  # grey levels, of a 3 × 3 mean of the half-size image
+APART_STILL, APART_MOVED = 0.04, 0.1  # px by which two half-size images may lie apart, as a standard deviation
+MOST = 180  # peaks kept, the strongest; the grid has 121 dots
+
+
+def gained(off: Image, on: Image, motion: Array, reachable: Image) -> Peaks:
+    """Peaks (n, 2) (u, v) of the whole image, strongest first, where the half-size `on` gained light over `off` moved
+    by motion (2,) px of the whole image. reachable (h, w) of the whole image: not zero where peaks may be."""
+    gain, step = np.zeros(on.shape, np.float32), np.zeros(on.shape, np.float32)
+    _gains(off, on, -float(motion[0]) / 2, -float(motion[1]) / 2, gain, step)
+    apart = APART_MOVED if motion.any() else APART_STILL
+    return _strongest(gain, step, max(_noise(gain), LEAST_NOISE), apart, reachable)
+
+
+def standing_out(on: Image, reachable: Image) -> Peaks:
+    """Peaks as of `gained` in a single laser-on image, by how far each pixel stands above the brightest on a ring
+    around it: neither edges nor cables do, for the ring meets them, too."""
+    v, u = np.mgrid[-RING : RING + 1, -RING : RING + 1]
+    ring = (np.abs(np.hypot(u, v) - RING) < 0.5).astype(np.uint8)
+    light = on.astype(np.float32)
+    soft = cv2.GaussianBlur(light, (5, 5), 0)
+    height = np.asarray(soft - cv2.dilate(soft, ring), np.float32)
+    height[:RING], height[-RING:], height[:, :RING], height[:, -RING:] = 0, 0, 0, 0
+    rough = light[::3, 2:] - 2 * light[::3, 1:-1] + light[::3, :-2]
+    noise = 1.4826 * float(np.median(np.abs(rough))) / np.sqrt(6)
+    return _strongest(height, np.zeros_like(height), max(noise, 4 * LEAST_NOISE), 0.0, reachable)
+
+
+def _strongest(gain: Array, step: Array, noise: float, apart: float, reachable: Image) -> Peaks:
+    uv, level = np.empty((16 * MOST, 2), np.int64), np.empty(16 * MOST, np.float32)
+    count = _maxima(gain, step, noise, apart, SIGNIFICANT, reachable, uv, level)
+    order = np.argsort(-level[:count], kind="stable")[:MOST]
+    return np.ascontiguousarray(uv[:count][order])
+
+
+@compiled
+def _gains(off: Image, on: Image, du: float, dv: float, gain: Array, step: Array) -> None:
+    """Write gain (h, w): on minus off, sampled (du, dv) away, mean of 3 × 3 over that of 7 × 7; step (h, w): slope of
+    the sampled off, grey levels per px. Untouched along the border."""
+    height, width = on.shape
+    shift_u, shift_v = int(np.floor(du)), int(np.floor(dv))
+    part_u, part_v = np.float32(du - shift_u), np.float32(dv - shift_v)
+    one = np.float32(1)
+    c00, c01 = (one - part_u) * (one - part_v), part_u * (one - part_v)
+    c10, c11 = (one - part_u) * part_v, part_u * part_v
+    left, right = max(0, -shift_u), min(width, width - shift_u - 1)
+    top, bottom = max(0, -shift_v), min(height, height - shift_v - 1)
+    inner = right - left
+    if inner < 8 or bottom - top < 8:
+        return
+    still = np.empty((height, inner), np.float32)
+    difference = np.empty((height, inner), np.float32)
+    for v in range(top, bottom):
+        upper, lower = off[v + shift_v, left + shift_u :], off[v + shift_v + 1, left + shift_u :]
+        upper_next, lower_next = upper[1:], lower[1:]
+        light, moved, rest = on[v, left:], still[v], difference[v]
+        for i in range(inner):
+            value = c00 * np.float32(upper[i]) + c01 * np.float32(upper_next[i])
+            value += c10 * np.float32(lower[i]) + c11 * np.float32(lower_next[i])
+            moved[i] = value
+            rest[i] = np.float32(light[i]) - value
+    three, seven = np.empty(inner, np.float32), np.empty(inner, np.float32)
+    beside = np.empty(inner, np.float32)
+    ninth, forty_ninth, sixth = np.float32(1 / 9), np.float32(1 / 49), np.float32(1 / 6)
+    count = inner - 6
+    for v in range(top + 3, bottom - 3):
+        r0, r1, r2, r3 = difference[v - 3], difference[v - 2], difference[v - 1], difference[v]
+        r4, r5, r6 = difference[v + 1], difference[v + 2], difference[v + 3]
+        above, here, below = still[v - 1], still[v], still[v + 1]
+        for i in range(inner):
+            middle = r2[i] + r3[i] + r4[i]
+            three[i] = middle
+            seven[i] = middle + r0[i] + r1[i] + r5[i] + r6[i]
+            beside[i] = above[i] + here[i] + below[i]
+        s0, s1, s2, s3, s4, s5, s6 = seven, seven[1:], seven[2:], seven[3:], seven[4:], seven[5:], seven[6:]
+        t2, t3, t4, b2, b4 = three[2:], three[3:], three[4:], beside[2:], beside[4:]
+        a2, a3, a4, d2, d3, d4 = above[2:], above[3:], above[4:], below[2:], below[3:], below[4:]
+        out, slope = gain[v, left + 3 :], step[v, left + 3 :]
+        for i in range(count):
+            out[i] = ninth * (t2[i] + t3[i] + t4[i]) - forty_ninth * (
+                s0[i] + s1[i] + s2[i] + s3[i] + s4[i] + s5[i] + s6[i]
+            )
+        for i in range(count):
+            across, down = b4[i] - b2[i], d2[i] + d3[i] + d4[i] - a2[i] - a3[i] - a4[i]
+            slope[i] = sixth * np.sqrt(across * across + down * down)
+
+
+@compiled
+def _noise(gain: Array) -> float:
+    """Standard deviation of the noise in gain (h, w), from the median of a part of it."""
+    height, width = gain.shape
+    bins = np.zeros(512, np.int64)
+    total = 0
+    for v in range(4, height - 4, 5):
+        for u in range(4, width - 4, 3):
+            value = abs(gain[v, u])
+            if value > 0:
+                bins[min(int(value * 40), 511)] += 1
+                total += 1
+    seen, middle = 0, 0
+    while middle < 511 and 2 * (seen + bins[middle]) < total:
+        seen += bins[middle]
+        middle += 1
+    return 1.4826 * (middle + 0.5) / 40
+
+
+@compiled
+def _maxima(gain: Array, step: Array, noise: float, apart: float, threshold: float, reachable: Image, uv: Peaks,
+            level: Array) -> int:  # fmt: skip
+    """Write the pixels whose gain is largest among their 5 × 5 and above a threshold, in standard deviations: noise,
+    or the step over `apart` px where that is more. Written: uv (m, 2) px of the image of twice the
+    size, level (m,); returned: how many."""
+    height, width = gain.shape
+    count = 0
+    least, part, bound = np.float32(noise), np.float32(apart), np.float32(threshold)
+    for v in range(2, height - 2):
+        values, slopes = gain[v], step[v]
+        for u in range(2, width - 2):
+            if values[u] <= bound * max(least, part * slopes[u]):
+                continue
+            if reachable[2 * v, 2 * u] == 0 or count == len(level):
+                continue
+            value = values[u] / max(least, part * slopes[u])
+            highest = True
+            for k in range(25):
+                b, a = v + k // 5 - 2, u + k % 5 - 2
+                other = gain[b, a] / max(least, part * step[b, a])
+                if other > value or (other == value and k < 12):
+                    highest = False
+                    break
+            slope = np.float32(0)  # what a step leaves lies beside it, too
+            for k in range(9):
+                slope += step[v + k // 3 - 1, u + k % 3 - 1] / np.float32(9)
+            value = values[u] / max(least, part * slope)
+            if highest and value > bound:
+                uv[count, 0], uv[count, 1], level[count] = 2 * u, 2 * v, value
+                count += 1
+    return count
