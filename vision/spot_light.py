@@ -117,7 +117,7 @@ def _plane_through_border(values: Floats, plane: Floats, side: int) -> None:
 @compiled
 def _border_roughness(values: Floats, side: int) -> float:
     """Variance of noise from second differences along a square's border, where there is hardly any of the spot."""
-    total, number, last = np.float32(0), 0, side * side - side
+    total, number, last = 0.0, 0, side * side - side
     for k in range(side - 2):
         for start, step in ((0, 1), (last, 1), (0, side), (side - 1, side)):
             at = start + k * step
