@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from devices.scenes import BladePiece, Scene
-from devices.scenes.truth import EdgeTruth
+from devices.scenes.truth import EdgeTruth, SceneTruth
 from vision.observation import BladeObservation, Dots, Edge
 
 SAME_DOT_PX = 2.0  # of a 612 pixels wide image: nearer than that a spot of the right index is the dot
+SAME_DIRECTION = 0.005  # of the tangent, between a point and its true dot
 VISIBLE_PX = 120.0  # a shorter stretch of an edge need not be found
 
 
@@ -19,10 +20,10 @@ class Verdict:
     """One scene. Pixels are of a 2448 pixels wide image, as the figures asked for are; lengths in metres.
 
     dots_*: counts of true dots on the blade, found among them, reported, wrong. dot_px: their errors. depth_error:
-    relative, of the mean distance, depth_z: over its claimed sigma, point_sigma_m: of single points against the
-    truth. edge_errors: (degrees, px) of every reported edge, edges_due: how many ought to be found. heading_deg:
-    error. tip_m: error along the axis, NaN where a tip in view was missed, None where there is none; false_tip.
-    unsaid: an edge off by more than 3° or a distance by more than 10 % while valid. angle_deg: of the blade.
+    relative, of the mean distance, depth_z: over its claimed sigma. points: (error, claimed sigma) in metres of the
+    depth of every single point. edge_errors: (degrees, px) of every reported edge, edges_due: how many ought to be
+    found. heading_deg: error. tip_m: error along the axis, NaN where a tip in view was missed, None where there is
+    none; false_tip. unsaid: an edge off by more than 3° or a distance by more than 10 % while valid. angle_deg: of the blade.
     """
 
     view: str
@@ -44,6 +45,9 @@ class Verdict:
     tip_m: float | None
     false_tip: bool
     unsaid: bool
+    distance_m: float = 0.0
+    baseline_m: float = 0.0
+    points: tuple[tuple[float, float], ...] = ()
 
     @property
     def edges_right(self) -> bool:
@@ -102,6 +106,9 @@ def judge(scene: Scene, seen: BladeObservation) -> Verdict:
         tip_m=tip,
         false_tip=truth.tip_point_px is None and seen.tip is not None,
         unsaid=seen.valid and off,
+        distance_m=truth.distance_m,
+        baseline_m=settings.baseline_m,
+        points=_points(seen, truth),
     )
 
 
@@ -116,6 +123,19 @@ def _dots(found: Dots | None, true: Dots, within: float) -> tuple[np.ndarray, se
             else:
                 wrong += 1
     return np.array(errors).reshape(-1, 2), right, wrong
+
+
+def _points(seen: BladeObservation, truth: SceneTruth) -> tuple[tuple[float, float], ...]:
+    """Error and claimed sigma of the depth of each point, against the true dot in the same direction."""
+    if seen.points is None or seen.sigma_m is None or not truth.on_blade.any():
+        return ()
+    true = truth.points[truth.on_blade]
+    sight, true_sight = seen.points[:, 1:] / seen.points[:, :1], true[:, 1:] / true[:, :1]
+    apart = np.hypot(*(sight[:, None] - true_sight).transpose(2, 0, 1))
+    nearest = apart.argmin(axis=1)
+    same = apart.min(axis=1, initial=np.inf) < SAME_DIRECTION
+    errors = seen.points[:, 0] - true[nearest, 0]
+    return tuple(zip(errors[same].tolist(), np.asarray(seen.sigma_m)[same].tolist(), strict=True))
 
 
 def _nearest(edge: Edge, true: tuple[EdgeTruth, ...]) -> EdgeTruth | None:
