@@ -23,7 +23,8 @@ class Verdict:
     relative, of the mean distance, depth_z: over its claimed sigma. points: (error, claimed sigma) in metres of the
     depth of every single point. edge_errors: (degrees, px) of every reported edge, edges_due: how many ought to be
     found. heading_deg: error. tip_m: error along the axis, NaN where a tip in view was missed, None where there is
-    none; false_tip. unsaid: an edge off by more than 3° or a distance by more than 10 % while valid. angle_deg: of the blade.
+    none; false_tip. unsaid: an edge off by more than 3° or a distance by more than 10 % while valid. angle_deg: of the
+    blade.
     """
 
     view: str
