@@ -61,6 +61,7 @@ class Conductor:
         self._autopilot = services.autopilot
         self._gate = Gate()
         services.commanded.resumed = self._resumed
+        services.keep = self._keep
         self._queue = EventQueue()
         self._helm = Helm(services, self._gate, lambda gap_s: self.raise_event("setpoints_stalled", gap_s=gap_s))
         guard_services(services, self._gate)
@@ -206,6 +207,12 @@ class Conductor:
         await self._begin()
         if self._gate.let_go and self._ended is None:
             self._ended = "released"
+
+    async def _keep(self) -> None:
+        """Have what was found out in the journal, within what a slow disk may take."""
+        self._chronicle.found_out(self.state)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(asyncio.shield(self._chronicle.journal.durable()), SLOWEST_DISK_S)
 
     async def _begin(self) -> None:
         """Start what the active leaf does; without a behaviour, hold."""
