@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -110,20 +109,6 @@ def test_ctrl_c_flies_the_abort_path_and_completes_the_record(tmp_path: Path) ->
     told = summary(tmp_path)
     assert told["outcome"] == "aborted" and told["final_state"] == "aborted"
     assert journal(the_run(tmp_path))[-1]["kind"] == "end"
-
-
-def test_a_killed_executive_leaves_the_vehicle_to_its_own_failsafe(tmp_path: Path) -> None:
-    with subprocess.Popen(
-        command(SQUARE, tmp_path, "--speed", "2"), cwd=ROOT, stdout=subprocess.DEVNULL, start_new_session=True
-    ) as process:
-        try:
-            wait_for(lambda: reached(tmp_path, "square.east"))
-        finally:
-            os.kill(process.pid, signal.SIGKILL)
-    run = the_run(tmp_path)
-    wait_for(lambda: any(event["kind"] == "failsafe" for event in vehicle_events(run)), 30)
-    wait_for(lambda: any(event["kind"] == "stopped" for event in vehicle_events(run)), 60)
-    assert journal(run), "what had been decided is on the disk"
 
 
 def test_a_connection_that_never_answers_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
