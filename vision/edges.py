@@ -8,17 +8,19 @@ blade has dots on both sides or a weaker step than the edge. The edges of one bl
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.candidates import Blade, Candidate, OtherEye, run_of, weigh
+from vision.candidates import Candidate, weigh
 from vision.capture import Image
-from vision.lines import edge_pixels, hough_lines, refine_lines, sensor_noise, smoothed
+from vision.closing import evidence_of, find_closed, goes_on, trimmed
+from vision.ending import Ending
+from vision.evidence import Blade, OtherEye
+from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
 from vision.observation import Edge, Line
-from vision.spike import Spike, edges_behind, find_spike
 
 Array = NDArray[Any]  # of floats
 
@@ -27,65 +29,50 @@ LARGEST_TAPER = np.deg2rad(16)
 LARGEST_FLARE = np.deg2rad(28)  # of the root; so much is believed only where the axis is known
 LEAST_VALUE = 1.2
 PLAIN = 2.5  # times the blade's own texture: a step that needs no other witness to be an edge
+BEHIND_SHOULDER = 12.0  # px: so far behind it an end no longer bends the edges
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
 
 
 @dataclass(frozen=True)
 class Found:
-    """The blade's edges (none, one or two), the direction of its axis modulo π, NaN where nothing gives it, a spiked
-    tip
-    if there is one, and reasons where there is no edge."""
+    """The blade's edges (none, one or two), the direction of its axis modulo π, NaN where nothing gives it, how it
+    ends if it ends in the image, and reasons where there is no edge."""
 
     edges: tuple[Candidate, ...]
     axis: float
-    spike: Spike | None
+    ending: Ending | None
     reasons: tuple[str, ...]
 
 
 def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: float | None = None) -> Found:
-    """The blade's edges and axis. tones (h, w, c): working image, free of dots. expected: direction of the axis in the
-    image (rad, modulo π) where it is known beforehand; lines that run otherwise are then none of the blade's edges."""
+    """The blade's edges, axis and end. tones (h, w, c): working image, free of dots. expected: direction of the axis in
+    the image (rad, modulo π) where it is known beforehand; lines that run otherwise are then none of the blade's
+    edges."""
     height, width = tones.shape[:2]
     noise = sensor_noise(tones)
+    smooth = smoothed(tones)
     lines, _ = hough_lines(edge_pixels(tones, noise), 220, (width, height))
     if expected is not None:
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
-    candidates = weigh(lines, blade, smoothed(tones), noise, other)
-    chosen = _choose(candidates, blade.texture, LARGEST_TAPER if expected is None else LARGEST_FLARE)
-    spike = find_spike(candidates, blade.dots) if len(chosen) < 2 else None
-    if spike is not None:
-        behind = edges_behind(candidates, spike, 0.0)
-        reasons = () if behind else ("no edge: only the spiked tip is in view",)
-        return Found(behind, float(np.arctan2(spike.toward[1], spike.toward[0]) % np.pi), spike, reasons)
+    candidates = weigh(lines, blade, smooth, noise, other)
+    largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
+    chosen = _choose(candidates, blade.texture, largest)
+    ending = None
+    axis = float("nan") if expected is None else expected % np.pi
+    closed = None
+    if not goes_on(chosen):
+        closed = find_closed(candidates, blade, smooth, noise, largest)
+    if closed is not None and closed.evidence > evidence_of(chosen, blade):
+        ending = closed.ending
+        chosen = tuple(trimmed(edge, ending.toward, ending.shoulder - BEHIND_SHOULDER) for edge in closed.edges)
+    elif evidence_of(chosen, blade) < 0:
+        return Found((), axis, None, ("no edge: steps and dots contradict each other",))
     if not chosen:
         best = max((c.support for c in candidates), default=0.0)
-        axis = float("nan") if expected is None else expected % np.pi
         return Found((), axis, None, (f"no edge: the best line beside the dots has {best:.0%} support",))
     directions = np.array([np.arctan2(c.outward[1], c.outward[0]) + np.pi / 2 for c in chosen])
     axis = 0.5 * np.angle(np.exp(2j * directions).sum()) % np.pi
-    return Found(chosen, float(axis), None, ())
-
-
-def refocused(edges: tuple[Candidate, ...], tones: Image, station: float, toward: Array) -> tuple[Candidate, ...]:
-    """The edges as they are at a station along `toward` (2,), px: behind a tip, not where it bends them in."""
-    smooth, noise = smoothed(tones), sensor_noise(tones)
-    result = []
-    for edge in edges:
-        direction = edge.profile.direction[edge.index]
-        place = np.array([(station - edge.rho * float(edge.outward @ toward)) / float(direction @ toward)])
-        normal, rho = edge.outward[None], np.array([edge.rho])
-        for reach, slopes in ((8, 6.0), (4, 0.6)):
-            profile = refine_lines(smooth, normal, rho, noise, place, reach, slopes)
-            normal, rho = profile.normal, profile.rho
-        near = np.abs(profile.t[0] - place[0]) < 60
-        turned = float(normal[0] @ edge.outward)
-        if near.any() and profile.agrees[0][near].mean() > 0.6 and turned > np.cos(np.deg2rad(25)):
-            result.append(
-                replace(edge, outward=normal[0], rho=float(rho[0]), profile=profile, index=0, ends=run_of(profile, 0))
-            )
-        else:
-            result.append(edge)
-    return tuple(result)
+    return Found(chosen, float(axis), ending, ())
 
 
 def _choose(candidates: list[Candidate], texture: float, largest: float) -> tuple[Candidate, ...]:

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import RigGeometry
-from vision.candidates import Blade, Candidate, OtherEye, texture_between
+from vision.candidates import Candidate
 from vision.capture import Image, StereoFrames
 from vision.chord import chord, heading
-from vision.closing import close
 from vision.dots import Spots, find_spots, without_spots
 from vision.edges import edge_of, find_edges
+from vision.evidence import Blade, OtherEye, texture_between
 from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser, reachable
 from vision.lines import smoothed
 from vision.observation import BladeObservation, Dots
@@ -120,13 +120,19 @@ class Eye:
         smooth = smoothed(clean)
         seeds = left.uv[blade.left]
         dots = seeds - camera.centre
-        around = Blade(dots, self._absent(left, right, matches, blade, surface), texture_between(smooth, seeds))
+        around = Blade(
+            dots,
+            self._absent(left, right, matches, blade, surface),
+            texture_between(smooth, seeds),
+            slope=surface.slope,
+            focal=camera.fx,
+        )
         other = None
         if right is not None:
             other = OtherEye(smoothed(tones(images["right_laser"])), self._stereo, surface)
         found = find_edges(clean, around, other, expected)
         watch.lap("edges")
-        edges, outline = close(found, clean, smooth, around)
+        edges = found.edges
         axis, reasons = found.axis, found.reasons
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]
@@ -161,7 +167,7 @@ class Eye:
             distance_sigma_m=float(np.sqrt(surface.covariance[0, 0])),
             nearest_m=float(np.linalg.norm(points, axis=1).min()),
             edges=tuple(edge_of(edges[k], factor) for k in order),
-            tip=tip_of(outline, factor) if outline is not None else None,
+            tip=tip_of(found.ending, factor) if found.ending is not None else None,
             heading=direction,
             heading_sigma=_heading_sigma(edges) if direction is not None else None,
             chord_m=width[0] if width else None,

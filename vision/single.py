@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.candidates import Blade, Candidate, texture_between
+from vision.candidates import Candidate
 from vision.capture import Image
-from vision.closing import close
 from vision.edges import edge_of, find_edges
+from vision.evidence import Blade, texture_between
 from vision.lattice import find_lattice
 from vision.lines import sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
@@ -58,7 +58,7 @@ def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = Non
     blade = Blade(seeds - centre, lattice.absent[inside] - centre, texture_between(smooth, seeds), 0.1, False)
     found = find_edges(clean, blade, None)
     watch.lap("edges")
-    edges, outline = close(found, clean, smooth, blade)
+    edges = found.edges
     axis, reasons = found.axis, found.reasons
     watch.lap("tip")
     return BladeObservation(
@@ -67,7 +67,7 @@ def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = Non
         reasons=reasons,
         dots_left=Dots((seeds + 0.5) / scale - 0.5, lattice.row, lattice.column),
         edges=tuple(edge_of(edge, 1 / scale) for edge in _left_first(edges, axis)),
-        tip=tip_of(outline, 1 / scale) if outline is not None else None,
+        tip=tip_of(found.ending, 1 / scale) if found.ending is not None else None,
         heading=axis if edges else None,
         heading_sigma=float(np.deg2rad(1.0 if len(edges) == 2 else 3.0)) if edges else None,
         sharpness=sharpness(clean, edges),

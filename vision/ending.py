@@ -1,0 +1,281 @@
+"""The end of a blade: two edges closed by a round, square or spiked outline, fitted as one shape in lanes along the
+axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.candidates import Candidate
+from vision.capture import Image
+from vision.ending_kernels import likeliest
+from vision.evidence import Blade
+from vision.lines import sampled, visible_stretch
+
+Array = NDArray[Any]  # of floats
+
+LANES = 25  # across the blade, from edge to edge
+STEP = 1.5  # px along a lane
+SLACK = 4  # samples by which an outline may miss the steps before it is fitted to them
+BOX, LONG_BOX = 4, 14  # samples averaged on either side of a step, and on either side to tell it from a streak
+CORRELATED_PX = 8.0  # so far along an outline its steps tell the same
+SEEN, UNSEEN = 1.28, -2.0  # log of how much likelier an outline is to show a step, or none, than other places are
+CLOSED, OPEN = 1.4, -1.6  # the same where a lane ends
+HOLE = -2.5  # of a missing dot inside the outline
+DOT_ROOM = 3.0  # px: a dot's centre may lie so far beyond the outline
+NARROWEST = 16.0  # px
+HIDDEN_PX = 9.0  # a step so far before the outline hides it
+SUMMITS = (0.0, -0.1, 0.1, -0.3, 0.3, -0.6, 0.6)  # of an outline, from the middle toward an edge
+LOPSIDED = -8.0  # evidence of an outline whose summit is all the way to one side
+BORDER = 6.0  # px: an outline nearer to the image border than this is not seen to close
+
+
+def _shapes() -> tuple[Array, Array]:
+    """Lengths (k,) in widths of the blade and depths (k, LANES) below the outermost point, in lengths, of outlines."""
+    x = 2 * lane_shares() - 1
+    found: list[tuple[float, Array]] = [(0.0, np.zeros(LANES))]
+    for summit in SUMMITS:
+        apart = np.where(x < summit, (summit - x) / (1 + summit), (x - summit) / (1 - summit))
+        found += [(length, 1 - np.sqrt(1 - apart**2)) for length in (0.2, 0.32, 0.45, 0.6, 0.8)]
+        found += [(length, apart) for length in (0.4, 0.5, 0.6, 0.7, 0.8, 0.92, 1.05)]
+    return np.array([length for length, _ in found]), np.array([depth for _, depth in found])
+
+
+def lane_shares() -> Array:
+    """Where the lanes lie between the edges (LANES,), 0 on the one and 1 on the other."""
+    return np.linspace(0.05, 0.95, LANES)
+
+
+LENGTHS, DEPTHS = _shapes()
+PRIORS = LOPSIDED * np.abs(2 * lane_shares()[DEPTHS.argmin(axis=1)] - 1) * (LENGTHS > 0)
+
+
+def _depths(shares: Array) -> Array:
+    """Depths (k, n) of the shapes at shares (n,) of the way from edge to edge, in lengths."""
+    place = np.clip((shares - 0.05) / 0.9 * (LANES - 1), 0, LANES - 1)
+    lane = np.minimum(place.astype(np.int64), LANES - 2)
+    part = place - lane
+    return np.asarray(DEPTHS[:, lane] * (1 - part) + DEPTHS[:, lane + 1] * part)
+
+
+@dataclass(frozen=True)
+class Side:
+    """An edge of the blade seen along an axis: offset across it is `offset + slope · station`. evidence: places along
+    the axis (m,) and what each says for an edge there (m,); None for a side that no edge was seen of."""
+
+    offset: float
+    slope: float
+    stations: Array
+    evidence: Array
+
+    def at(self, station: Array | float) -> Array:
+        """Offset across the axis at stations."""
+        return np.asarray(self.offset + self.slope * np.asarray(station, float))
+
+    def until(self, station: Array) -> Array:
+        """What speaks for an edge that goes on to stations and no further."""
+        if len(self.stations) == 0:
+            return np.zeros_like(station)
+        sums = np.r_[0.0, np.cumsum(self.evidence)]
+        return np.asarray(sums[np.searchsorted(self.stations, station)])
+
+
+def side_of(edge: Candidate, toward: Array) -> Side:
+    """An edge as seen along a direction (2,)."""
+    across = np.array([-toward[1], toward[0]])
+    profile, k = edge.profile, edge.index
+    slope = float(edge.outward @ across)
+    direction = profile.direction[k]
+    t = profile.t[k]
+    stations = edge.rho * float(edge.outward @ toward) + t * float(direction @ toward)
+    evidence = np.where(profile.agrees[k], SEEN, UNSEEN) * abs(float(t[1] - t[0])) / CORRELATED_PX
+    if stations[-1] < stations[0]:
+        stations, evidence = stations[::-1], evidence[::-1]
+    return Side(edge.rho / slope, -float(edge.outward @ toward) / slope, stations, evidence)
+
+
+def side_beside(dots: Array, toward: Array, sign: float, slope: float) -> Side:
+    """A side that no edge was seen of: just past the dots that lie outermost across the axis."""
+    across = np.array([-toward[1], toward[0]])
+    reach = dots @ across - slope * (dots @ toward)
+    offset = float(reach.max()) + 8.0 if sign > 0 else float(reach.min()) - 8.0
+    return Side(offset, slope, np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a blade between two sides may end. toward (2,): along the axis; station and lane: the outermost point on
+    it, px; shoulder: where the edges end; share: of the lanes in which a step is seen; evidence: for the blade with
+    this end; goes_on: for the blade that leaves the image."""
+
+    toward: Array
+    station: float
+    lane: float
+    shoulder: float
+    share: float
+    sigma_px: float
+    step: float
+    evidence: float
+    goes_on: float
+
+
+def fit_ending(
+    smooth: Image, noise: float, sides: tuple[Side, Side], toward: Array, blade: Blade, usual: float
+) -> Ending | None:
+    """The likeliest end of the blade between its lower and upper side along `toward` (2,), None where none can be.
+
+    usual: the height of the edges' steps in grey levels.
+    """
+    low, high = sides
+    height, width = smooth.shape[:2]
+    centre = np.array([(width - 1) / 2, (height - 1) / 2])
+    across = np.array([-toward[1], toward[0]])
+    along, aside = blade.dots @ toward, blade.dots @ across
+    last_dot = float(along.max())
+    wide = float(high.at(last_dot) - low.at(last_dot))
+    if wide < NARROWEST:
+        return None
+    middle = float(high.at(last_dot) + low.at(last_dot)) / 2
+    start, stop = visible_stretch(across[None], np.array([middle]), centre - 2)
+    sign = 1.0 if np.array([-across[1], across[0]]) @ toward > 0 else -1.0
+    border = float((stop if sign > 0 else -start)[0])
+    first = last_dot - 1.3 * wide - LONG_BOX * STEP
+    far = min(border, last_dot + 1.3 * wide + 60)
+    s = np.arange(first, far, STEP)
+    if len(s) < 4 * LONG_BOX:
+        return None
+    shares = lane_shares()
+    skew = blade.skew(last_dot * toward + middle * across, toward)
+    lanes = low.at(s) + shares[:, None] * (high.at(s) - low.at(s))
+    along_lanes = s + skew * (shares[:, None] - 0.5) * wide
+    u = along_lanes * toward[0] + lanes * across[0] + centre[0]
+    v = along_lanes * toward[1] + lanes * across[1] + centre[1]
+    outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
+    size, least = _steps_along(sampled(smooth, u, v), noise, usual, blade.texture)
+    size[outside] = 0.0
+    # A lane may not end before the dots it carries.
+    share_of = (aside - low.at(along)) / np.maximum(high.at(along) - low.at(along), 1.0)
+    along = along - skew * (share_of - 0.5) * wide
+    beside = np.abs(share_of[:, None] - shares) * wide < 4.0
+    quiet = np.where(beside, along[:, None], -np.inf).max(axis=0) - 4.0
+    size[s[None] < quiet[:, None]] = 0.0
+    hidden = _strongest_before(size)
+    seen = np.clip(size / least - 0.5, 0.0, 1.0)
+    seen[(hidden > 1.3 * size) & (hidden > 1.5 * least)] *= 0.3
+    for _ in range(SLACK):
+        seen[:, 1:-1] = np.maximum(seen[:, 1:-1], 0.95 * np.maximum(seen[:, :-2], seen[:, 2:]))
+    return _best(s, seen, size, sides, toward, blade, share_of, along, border, wide, skew)
+
+
+def _best(
+    s: Array,
+    seen: Array,
+    size: Array,
+    sides: tuple[Side, Side],
+    toward: Array,
+    blade: Blade,
+    share_of: Array,
+    along: Array,
+    border: float,
+    wide: float,
+    skew: float,
+) -> Ending | None:
+    low, high = sides
+    across = np.array([-toward[1], toward[0]])
+    shares = lane_shares()
+    reach = LENGTHS * wide
+    # Dots that the outline has to hold, and missing ones that it should not.
+    strays = int(blade.strays * len(along) + 0.9) if len(along) >= 20 else 0
+    needed = np.sort(along + reach[:, None] * _depths(share_of), axis=1)[:, len(along) - 1 - strays] - DOT_ROOM
+    gone, aside = blade.absent @ toward, blade.absent @ across
+    share_gone = (aside - low.at(gone)) / np.maximum(high.at(gone) - low.at(gone), 1.0)
+    between = (share_gone > 0.08) & (share_gone < 0.92)
+    gone, share_gone = (gone - skew * (share_gone - 0.5) * wide)[between], share_gone[between]
+    holes = np.sort(gone + reach[:, None] * _depths(share_gone), axis=1) + DOT_ROOM
+    hole = HOLE if blade.grid_known else HOLE / 2
+    shift = np.rint(DEPTHS * reach[:, None] / STEP).astype(np.int64)
+    lead = int(shift.max()) + 1
+    ahead = s[0] + STEP * np.arange(-lead, len(s))
+    k, top, evidence, share_top = likeliest(
+        np.ascontiguousarray(seen, np.float64),
+        shift,
+        np.rint(reach / STEP).astype(np.int64),
+        PRIORS,
+        wide * np.hypot(1.0, 2 * LENGTHS) / CORRELATED_PX,
+        np.ceil((needed - s[0]) / STEP).astype(np.int64),
+        (holes - s[0]) / STEP,
+        low.until(ahead) + high.until(ahead),
+        int((border - BORDER - s[0]) / STEP),
+        CLOSED,
+        OPEN,
+        hole,
+    )
+    if k < 0:
+        return None
+    end = np.array([border + 1e3])
+    goes_on = float((low.until(end) + high.until(end))[0]) + hole * len(gone)
+    at = top - shift[k]
+    lanes_seen = (at >= 0) & (seen[np.arange(LANES), np.maximum(at, 0)] > 0.4)
+    station, scatter = _refined(s, size, at, lanes_seen, DEPTHS[k], float(reach[k]), float(s[top]))
+    lane_share = float(shares[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
+    lane = float(low.at(station) + lane_share * (high.at(station) - low.at(station)))
+    outermost = station + skew * (lane_share - 0.5) * wide
+    step = float(np.median(size[np.arange(LANES), np.maximum(at, 0)][lanes_seen])) if lanes_seen.any() else 0.0
+    return Ending(toward, outermost, lane, float(s[top] - reach[k]), share_top, scatter, step, evidence, goes_on)
+
+
+def _refined(
+    s: Array, size: Array, at: NDArray[np.int64], seen: NDArray[np.bool_], shape: Array, reach: float, station: float
+) -> tuple[float, float]:
+    """The outermost point's station, from the steepest places near the outline, and its standard deviation."""
+    near = np.clip(at[:, None] + np.arange(-4, 5), 0, size.shape[1] - 1)
+    values = np.take_along_axis(size, near, 1)
+    top = np.clip(values.argmax(axis=1), 1, 7)
+    rows = np.arange(len(at))
+    before, peak, after = values[rows, top - 1], values[rows, top], values[rows, top + 1]
+    bend = before - 2 * peak + after
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = np.where(bend < 0, np.clip(0.5 * (before - after) / bend, -0.5, 0.5), 0.0)
+    place = s[near[rows, top]] + STEP * (shift - 0.5)
+    if seen.sum() < 6:
+        return station, 4.0
+    residual = (place - station + reach * shape)[seen]
+    # Outermost point and length of the outline together; the length is held to the shape's own.
+    terms = np.column_stack([np.ones(len(residual)), -shape[seen]])
+    fit = np.array([float(np.median(residual)), 0.0])
+    scatter = 1.0
+    held = np.diag([1e-6, 1.0 / max(0.1 * reach, 0.1) ** 2])
+    for _ in range(4):
+        off = residual - terms @ fit
+        scatter = max(0.7, 1.4826 * float(np.median(np.abs(off))))
+        weight = 1 / (1 + (off / (2 * scatter)) ** 2) ** 2 / scatter**2
+        information = (terms * weight[:, None]).T @ terms + held
+        fit = np.linalg.solve(information, (terms * weight[:, None]).T @ residual)
+    sigma = float(np.sqrt(3 * np.linalg.inv(information)[0, 0]))
+    return station + float(fit[0]), float(np.hypot(0.5, sigma))
+
+
+def _steps_along(strip: NDArray[np.float32], noise: float, usual: float, texture: float) -> tuple[Array, float]:
+    """Change (lanes, m) along each lane, that is no streak's, and how much counts as a step."""
+    short, long = _change(strip, BOX), _change(strip, LONG_BOX)
+    least = max(3.0, 1.5 * noise, 0.2 * usual, 0.9 * texture)
+    return np.where((long > 0.4 * short) & (long > 0.6 * least), short, 0.0), least
+
+
+def _change(strip: NDArray[np.float32], box: int) -> Array:
+    """Change (lanes, m) of the mean over `box` samples before and after each place, of the tone that changes most."""
+    padded = np.pad(strip, ((0, 0), (box, box), (0, 0)), mode="edge")
+    sums = np.cumsum(np.pad(padded, ((0, 0), (1, 0), (0, 0))), axis=1)
+    mean = (sums[:, box:] - sums[:, :-box]) / box
+    change: Array = np.abs(mean[:, box : box + strip.shape[1]] - mean[:, : strip.shape[1]]).max(axis=2)
+    return change
+
+
+def _strongest_before(size: Array) -> Array:
+    """The strongest step (lanes, m) in each lane that lies clearly before each place."""
+    back = int(HIDDEN_PX / STEP)
+    strongest = np.maximum.accumulate(size, axis=1)
+    return np.hstack([np.zeros((len(size), back)), strongest[:, :-back]])

@@ -1,0 +1,261 @@
+"""What speaks for a line as an edge of the blade: its steps, the dots beside it, what lies before it, the other eye."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.camera import StereoPair
+from vision.capture import Image
+from vision.lines import Profiles, sampled, steps
+from vision.surface import Surface
+
+Array = NDArray[Any]  # of floats
+
+INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
+LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
+ROUND_M = 1.0  # how far behind the surface before the camera a thick blade's edge may lie
+PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
+PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
+
+
+@dataclass(frozen=True)
+class Blade:
+    """The dots of the blade (n, 2), and where dots would be if it went on but are none, (m, 2); image frame, working
+    px.
+
+    texture: how strong steps on the blade itself are, between neighbouring dots, in grey levels.
+    strays: share of the dots that may lie beyond an edge all the same. grid_known: `absent` rests on the laser's own
+    grid.
+    slope (2,): of the surface, change of depth to the right and down; focal: in working px; None where unknown.
+    """
+
+    dots: Array
+    absent: Array
+    texture: float
+    strays: float = 0.03
+    grid_known: bool = True
+    slope: Array | None = None
+    focal: float = 616.0
+
+    def skew(self, point: Array, toward: Array) -> float:
+        """How much farther along `toward` (2,) a line across the blade, square to its axis on the surface, gets in the
+        image at `point` (2,) per px to the side."""
+        if self.slope is None:
+            return 0.0
+        ray = point / self.focal
+        lean = self.slope / max(1.0 - float(self.slope @ ray), 0.2)
+        across = np.array([-toward[1], toward[0]])
+        one, two = (np.r_[lean @ way, way + ray * (lean @ way)] for way in (toward, across))
+        return -float(one @ two) / float(one @ one)
+
+
+@dataclass(frozen=True)
+class OtherEye:
+    """The other eye's smoothed image and what is needed to look up a point of the blade's surface there."""
+
+    smooth: Image
+    stereo: StereoPair
+    surface: Surface
+
+
+def texture_between(smooth: Image, dots: Array) -> float:
+    """How strong the steps between neighbouring dots are: what the blade's own dirt and shade do. dots (n, 2) in
+    pixels."""
+    if len(dots) < 3:
+        return 0.0
+    apart = np.hypot(*(dots[:, None] - dots[None]).transpose(2, 0, 1))
+    first, second = np.nonzero(np.triu((apart > 16) & (apart < 44), 1))
+    if len(first) == 0:
+        return 0.0
+    share = np.linspace(0.0, 1.0, 12)[:, None, None]
+    points = dots[first] * (1 - share) + dots[second] * share
+    change = np.abs(steps(sampled(smooth, points[..., 0].T, points[..., 1].T)))
+    return float(np.quantile(change.max(axis=1), 0.8))
+
+
+def support_within(profile: Profiles, low: Array, high: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which places (k, m) lie between low and high (k,), all where too few do, and the share (k,) of them that
+    agree."""
+    within = (profile.t > low[:, None] - 8) & (profile.t < high[:, None] + 8)
+    within[within.sum(axis=1) < 6] = True
+    return within, (profile.agrees & within).sum(axis=1) / within.sum(axis=1)
+
+
+def beside(dots: Array, normal: Array) -> tuple[Array, Array]:
+    """The stretch (low, high) (k,) of each line that has dots beside it."""
+    along = dots @ np.stack([-normal[:, 1], normal[:, 0]])
+    along.sort(axis=0)
+    few = round(0.04 * (len(along) - 1))
+    return along[few], along[len(along) - 1 - few]
+
+
+def typical_step(profile: Profiles, within: NDArray[np.bool_]) -> Array:
+    """Median height (k,) of the agreeing steps, in grey levels."""
+    steps = np.where(profile.agrees & within, np.abs(profile.step), np.nan)
+    none = ~np.isfinite(steps).any(axis=1)
+    steps[none] = 0.0
+    return np.asarray(np.nanmedian(steps, axis=1), float)
+
+
+def runs(profile: Profiles) -> tuple[Array, Array]:
+    """First and last place (k,) of the longest stretch of each line on which its step goes on with small gaps."""
+    t = profile.t
+    length = np.maximum(t[:, 1] - t[:, 0], 1e-6)
+    window = int(np.clip(round(28.0 / float(np.median(length))), 3, 9))
+    padded = np.pad(profile.agrees.astype(np.int64), ((0, 0), (window // 2 + 1, window // 2)))
+    sums = np.cumsum(padded, axis=1)
+    share = (sums[:, window:] - sums[:, :-window])[:, : t.shape[1]] / window
+    first, last = t[:, 0].copy(), t[:, 0].copy()
+    for k in range(len(t)):
+        good = np.flatnonzero((share[k] > 0.5) & profile.agrees[k])
+        if len(good) == 0:
+            continue
+        breaks = np.flatnonzero(np.diff(good) * length[k] > LONGEST_GAP)
+        starts, stops = np.r_[0, breaks + 1], np.r_[breaks, len(good) - 1]
+        longest = int(np.argmax(good[stops] - good[starts]))
+        first[k], last[k] = t[k, good[starts[longest]]], t[k, good[stops[longest]]]
+    return first, last
+
+
+def run_of(profile: Profiles, k: int) -> tuple[float, float]:
+    """The places about its focus between which the steps of line k go on with small gaps."""
+    t, agrees, focus = profile.t[k], profile.agrees[k], float(profile.focus[k])
+    share = np.convolve(agrees, np.ones(7) / 7, mode="same") > 0.5
+    at = int(np.argmin(np.abs(t - focus)))
+    if not share[at]:
+        near = np.flatnonzero(share)
+        if len(near) == 0:
+            return float(t[0]), float(t[-1])
+        at = int(near[np.argmin(np.abs(near - at))])
+    length = t[1] - t[0]
+    first, last = at, at
+    for k in (np.flatnonzero(share[at:]) + at).tolist():
+        if (k - last) * length > LONGEST_GAP:
+            break
+        last = int(k)
+    for k in np.flatnonzero(share[: at + 1])[::-1].tolist():
+        if (first - k) * length > LONGEST_GAP:
+            break
+        first = int(k)
+    return float(t[first]), float(t[last])
+
+
+def missing(blade: Blade, normal: Array, rho: float, low: float, high: float) -> tuple[float, int]:
+    """Share of missing dots among those expected inside the line, beside the seen ones, and how many are missing
+    beyond."""
+    direction = np.array([-normal[1], normal[0]])
+    if len(blade.absent) == 0:
+        return 0.0, 0
+    along, distance = blade.absent @ direction, blade.absent @ normal - rho
+    near = (along > low - 10) & (along < high + 10)
+    innermost = float(np.median(blade.dots @ normal)) - rho
+    gone = int((near & (distance < -PLANE_PX) & (distance > innermost)).sum())
+    there = int((blade.dots @ normal - rho > innermost).sum())
+    return gone / max(gone + there, 1), int((near & (distance > PLANE_PX) & (distance < 45)).sum())
+
+
+def blocked(
+    profile: Profiles, blade: Blade, smooth: Image, step: Array, low: Array, high: Array, noise: float
+) -> Array:
+    """Share (k,) of the stretch between low and high on which a step as strong as the line's own, and stronger than
+    the blade's texture, lies between the outermost dots and the line."""
+    change, _ = _steps_before(profile, blade, smooth, low, high)
+    threshold = np.maximum(np.maximum(0.7 * step, 1.7 * blade.texture), 3.0 * noise)
+    return np.asarray((change.max(axis=2) > threshold[:, None]).mean(axis=1), float)
+
+
+def nearer_lines(
+    profile: Profiles, blade: Blade, smooth: Image, step: Array, low: Array, high: Array, noise: float
+) -> tuple[Array, Array]:
+    """Lines (normal (n, 2), rho (n,)) through the first steps outward of the outermost dots, where such lie before
+    the lines: what is nearest to the dots hides what is behind."""
+    change, places = _steps_before(profile, blade, smooth, low, high)
+    threshold = np.maximum(np.maximum(0.5 * step, 1.7 * blade.texture), 3.0 * noise)
+    strong = change > threshold[:, None, None]
+    normals, rhos = [], []
+    for k in np.flatnonzero(strong.any(axis=2).mean(axis=1) > 0.3).tolist():
+        seen = strong[k].any(axis=1)
+        # The samples run inward: the last strong one is the first that one meets outward; its peak is near by.
+        last = strong.shape[2] - 1 - strong[k, seen, ::-1].argmax(axis=1)
+        near = np.clip(last[:, None] - np.arange(3), 0, strong.shape[2] - 1)
+        peak = near[np.arange(len(last)), np.take_along_axis(change[k, seen], near, 1).argmax(axis=1)]
+        t, depth = places[k, seen], -(5.0 + INWARD_STEP * (peak + 1))
+        first, second = np.triu_indices(len(t), 1)
+        far = np.abs(t[second] - t[first]) > 0.25 * np.ptp(places[k])
+        if not far.any():
+            continue
+        slope = (depth[second] - depth[first])[far] / (t[second] - t[first])[far]
+        shift = depth[first][far] - slope * t[first][far]
+        off = np.abs(depth - shift[:, None] - slope[:, None] * t)
+        best = int(np.argmax((off < INWARD_STEP).sum(axis=1) - 0.1 * np.minimum(off, 9).mean(axis=1)))
+        if (off[best] < INWARD_STEP).sum() < 0.3 * INWARD_PLACES or abs(slope[best]) > 0.5:
+            continue
+        turn = float(np.arctan(slope[best]))
+        normal = profile.normal[k] * np.cos(turn) - profile.direction[k] * np.sin(turn)
+        normals.append(normal)
+        rhos.append(float(normal @ profile.normal[k]) * (float(profile.rho[k]) + float(shift[best])))
+    return np.array(normals).reshape(-1, 2), np.array(rhos)
+
+
+def _steps_before(profile: Profiles, blade: Blade, smooth: Image, low: Array, high: Array) -> tuple[Array, Array]:
+    """Steps (k, places, samples) in grey levels at samples inward of each line, zero farther in than its outermost
+    dots, and the places (k, places) along it."""
+    height, width = smooth.shape[:2]
+    centre = np.array([(width - 1) / 2, (height - 1) / 2])
+    share = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES
+    places = low[:, None] + (high - low)[:, None] * share
+    inward = 5.0 + INWARD_STEP * np.arange(INWARD_SAMPLES)
+    points = profile.normal[:, None] * profile.rho[:, None, None] + places[..., None] * profile.direction[:, None]
+    u = points[..., 0, None] - inward * profile.normal[:, 0, None, None] + centre[0]
+    v = points[..., 1, None] - inward * profile.normal[:, 1, None, None] + centre[1]
+    change = np.abs(steps(sampled(smooth, u, v)))
+    depth = (
+        profile.rho[:, None]
+        - np.sort(blade.dots @ profile.normal.T, axis=0)[round(0.85 * (len(blade.dots) - 1)), :, None]
+    )
+    within = inward[1:-1] < np.maximum(depth - 3, 0)
+    return np.where(within[:, None], change, 0.0), places
+
+
+def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noise: float) -> Array:
+    """Share (k,) of the agreeing places whose step the other eye sees where the blade's surface puts it.
+
+    NaN where the line's parallax against the far background is too small to tell them apart.
+    """
+    stereo, surface = other.stereo, other.surface
+    height, width = other.smooth.shape[:2]
+    t, agrees, step = (values[:, ::2] for values in (profile.t, profile.agrees & beside, profile.step))
+    lines, places = t.shape
+    points = (profile.normal * profile.rho[:, None])[:, None] + t[..., None] * profile.direction[:, None]
+    rays = stereo.left.rays((points + stereo.left.centre).reshape(-1, 2))
+    inverse = np.clip((1 - rays[:, 1:] @ surface.slope) / surface.depth_m, 0.02, 1.5)
+
+    def seen_at(depth: Array) -> Array:
+        """Pixels (lines, places, 2) of the right eye, for points at depths along the left eye's rays."""
+        return stereo.right.project((rays * depth[:, None]) @ stereo.rotation.T + stereo.translation).reshape(
+            lines, places, 2
+        )
+
+    there, deeper = seen_at(1 / inverse), seen_at(1 / inverse + ROUND_M)
+    far = stereo.right.project(rays @ stereo.rotation.T).reshape(lines, places, 2)
+    normal = profile.normal[:, None]
+    telling = np.abs(((deeper - far) * normal).sum(axis=2)).mean(axis=1) > 6.0
+    behind = ((deeper - there) * normal).sum(axis=2)[..., None]
+    reach = np.linspace(-1.0, 1.0, PARALLAX_SAMPLES)
+    across = np.minimum(behind, 0) + (np.abs(behind) + 2 * PARALLAX_PX) * (reach + 1) / 2 - PARALLAX_PX
+    u = there[..., 0, None] + across * profile.normal[:, 0, None, None]
+    v = there[..., 1, None] + across * profile.normal[:, 1, None, None]
+    raw = steps(sampled(other.smooth, u, v))
+    gradient: Array = (raw + np.roll(raw, 1, 1) + np.roll(raw, -1, 1)) / 3
+    middle = PARALLAX_SAMPLES // 2
+    seen = (u[..., middle] > 4) & (v[..., middle] > 4)
+    seen &= (u[..., middle] < width - 5) & (v[..., middle] < height - 5)
+    seen &= agrees
+    like = np.abs(gradient)
+    strong = like.max(axis=2) > np.maximum(0.4 * np.abs(step), 1.2 * noise)
+    share = (strong & seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
+    return np.asarray(np.where(telling & (seen.sum(axis=1) >= 5), share, np.nan), float)
