@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mission.behaviours.behaviour import NoParameters, behaviour
+from mission.behaviours.land import leave_landed
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -24,6 +25,8 @@ async def check_vehicle(services: Services, parameters: NoParameters) -> str:
     from flight.preflight import check
 
     autopilot, ours = services.autopilot, services.commanded.resumed
+    if ours and not (autopilot.telemetry.armed or autopilot.telemetry.in_air):
+        await leave_landed(services)  # its program was not there any more when it had landed
     while not (autopilot.telemetry.armable or autopilot.telemetry.armed or autopilot.telemetry.in_air):
         services.progress.text = "waiting until the vehicle can be armed"
         await services.clock.sleep(0.5)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from mission.executive.services import Services
 
 RETRY_S = 3.0
+NOT_TO_ARM_IN = ("OFFBOARD", "LAND", "RTL")
 
 
 @behaviour(outcomes={"landed": "on the ground and disarmed, or never this mission's to land"}, airborne=None)
@@ -40,4 +41,15 @@ async def land(services: Services, parameters: NoParameters) -> str:
         services.progress.text = f"{-float(autopilot.telemetry.pose.position[2]):.1f} m above home"
         await services.clock.sleep(0.2)
     services.setpoints.stop()
+    await leave_landed(services)
     return "landed"
+
+
+async def leave_landed(services: Services) -> None:
+    """Put it on hold: on the ground the autopilot is back in the mode it landed from, and refuses to arm in that."""
+    if services.autopilot.telemetry.flight_mode not in NOT_TO_ARM_IN:
+        return
+    try:
+        await services.autopilot.hold()
+    except AutopilotError as error:
+        services.log.warning("left in a mode that cannot be armed in", error=str(error))

@@ -54,7 +54,15 @@ class Aircraft:
         self.seconds += seconds
         self.highest_m = max(self.highest_m, -float(self.autopilot.vehicle.pose().position[2]))
 
-    def fly(self, journal: Path, log: Any, *, kill_after_s: float | None = None, past: Any = None) -> Outcome:
+    def fly(
+        self,
+        journal: Path,
+        log: Any,
+        *,
+        kill_after_s: float | None = None,
+        past: Any = None,
+        abort_after_s: float | None = None,
+    ) -> Outcome:
         """One program's flight, until its end or until it is killed."""
 
         async def flown() -> Outcome:
@@ -77,6 +85,8 @@ class Aircraft:
                 restore(services, past, in_air=in_air)
                 resume = where(self.mission, past, in_air=in_air)
             executive = Executive(self.mission, services, clock, Journal(journal, sync=False), resume=resume)
+            if abort_after_s is not None:
+                asyncio.get_running_loop().call_later(abort_after_s, executive.raise_event, "abort")
             if kill_after_s is not None:
                 asyncio.get_running_loop().call_later(kill_after_s, kill)
             return await asyncio.wait_for(executive.run(), 1000.0)
@@ -128,6 +138,32 @@ def test_killed_at_any_time_it_completes_or_lands(
     assert len(corners) == len(set(corners))
     for journal in ("first.jsonl", "second.jsonl"):
         assert asyncio.run(differences(tmp_path / journal, square)) == []
+
+
+@pytest.mark.parametrize(
+    "abort_after_s, dead_s", [(1.5, 0.3), (1.5, 20.0), (6.0, 0.3), (10.0, 20.0), (20.0, 0.3), (20.0, 30.0)]
+)
+def test_killed_on_its_way_home_from_an_abort_it_still_lands(
+    square: Mission, tmp_path: Path, silent: Any, abort_after_s: float, dead_s: float
+) -> None:
+    aircraft = Aircraft(square)
+    with pytest.raises(Killed):
+        aircraft.fly(tmp_path / "first.jsonl", silent, abort_after_s=abort_after_s, kill_after_s=abort_after_s + 2.0)
+    aircraft.pass_time(dead_s)
+    outcome = aircraft.fly(tmp_path / "second.jsonl", silent, past=interrupted(tmp_path / "first.jsonl", square))
+    assert outcome.outcome == "aborted"
+    assert not aircraft.autopilot.telemetry.armed
+    entered = [entry.fields["to"] for entry in read_journal(tmp_path / "second.jsonl") if entry.kind == "transition"]
+    assert not [state for state in entered if state.startswith(("square", "launch"))]
+
+
+def test_an_aborted_flight_is_flown_again_from_the_ground(square: Mission, tmp_path: Path, silent: Any) -> None:
+    """As after a change of battery."""
+    aircraft = Aircraft(square)
+    assert aircraft.fly(tmp_path / "first.jsonl", silent, abort_after_s=15.0).outcome == "aborted"
+    past = interrupted(tmp_path / "first.jsonl", square)
+    assert past.ended == "aborted"
+    assert aircraft.fly(tmp_path / "second.jsonl", silent, past=past).outcome == "completed"
 
 
 async def differences(journal: Path, mission: Mission) -> list[str]:

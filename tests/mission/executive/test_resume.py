@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from mission.executive.executive import Executive
 from mission.executive.journal import JournalError, read_journal
 from mission.executive.replay import Played, replay
-from mission.executive.resume import ResumeError, interrupted, remembered, where
-from mission.executive.services import Memory
+from mission.executive.resume import ResumeError, interrupted, last_of, remembered, where
+from mission.executive.services import Memory, Stretch
 from mission.language.semantics import Configuration
 
 
@@ -156,6 +156,39 @@ def test_on_the_ground_it_begins_anew_unless_it_was_on_its_way_home(
     assert where(flight.mission, past, in_air=in_air).leaf == goes_on
 
 
+def test_a_landing_is_over_on_the_ground_and_only_flying_begins_anew(fly: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    from mission.executive import resume
+
+    flight = fly(INSPECTION, PASSES)
+    known = {
+        name: replace(entry, airborne=None, outcomes={"landed": ""} if name == "finish" else {})
+        for name, entry in _known().items()
+    }
+    monkeypatch.setattr(resume, "behaviours", lambda: known)
+    assert where(flight.mission, interrupted_in(flight.mission, "home"), in_air=False).leaf == "home"
+    assert where(flight.mission, interrupted_in(flight.mission, "holding"), in_air=False).leaf == "start"
+
+
+def test_of_several_runs_the_newest_that_decided_anything_is_gone_on_with(fly: Any, tmp_path: Path) -> None:
+    from mission.record.folder import RunFolder
+    from mission.record.lineage import RunNote
+
+    first = killed_at(fly, 7.0)
+    folders = [RunFolder(tmp_path / name) for name in ("one", "two", "three")]
+    for folder, before in zip(folders, (None, "one", "two"), strict=True):
+        folder.path.mkdir()
+        folder.mission.write_text("mission: test\n")
+        RunNote(continues=before).write(folder)
+    assert last_of(folders[2], first.mission).configuration.leaf == "start"
+    folders[0].journal.write_bytes(first.path.read_bytes())
+    folders[2].journal.write_bytes(b"")
+    past = last_of(folders[2], first.mission)
+    assert past.configuration.leaf == "inspect.trailing" and past.folder == folders[0].path
+    assert past.memory.passes_done == ["leading"]
+
+
 def interrupted_in(mission: Any, leaf: str) -> Any:
     from mission.executive.resume import Interrupted
 
@@ -219,7 +252,13 @@ def test_what_cannot_be_gone_on_with_is_refused_in_one_line(fly: Any, tmp_path: 
 def test_memory_comes_back_as_it_was() -> None:
     from dataclasses import asdict
 
-    memory = Memory(home=(1.0, 2.0, 3.0), heading=0.5, passes_done=["leading"], values={"hub_sigma_m": 0.2})
+    memory = Memory(
+        home=(1.0, 2.0, 3.0),
+        heading=0.5,
+        passes_done=["leading"],
+        inspected={"leading": Stretch(4.0, 38.5, 0.3)},
+        values={"hub_sigma_m": 0.2},
+    )
     assert remembered({**asdict(memory), "of a later version": 1}) == memory
 
 

@@ -103,7 +103,7 @@ def test_a_refused_landing_is_asked_for_again(fly: Any) -> None:
     autopilot = Obedient("land", "land")
     flight = landing(fly, autopilot, (15.0, lambda executive: autopilot.says(armed=False, in_air=False)))
     assert flight.run().outcome == "completed"
-    assert autopilot.commands == ["land"] * 3
+    assert autopilot.commands == ["land"] * 3 + ["hold"], "on the ground it is left in a mode that can be armed"
 
 
 def test_a_mode_that_is_not_ours_is_not_landed_over(fly: Any) -> None:
