@@ -14,11 +14,10 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 from vision.camera import Camera, LaserGrid, StereoPair
 from vision.capture import Image
+from vision.grid_kernels import components, pairs, surfaces
 
 Array = NDArray[Any]  # of floats
 Indices = NDArray[np.int64]
@@ -27,8 +26,12 @@ NEAREST_M, FARTHEST_M = 0.8, 25.0
 EPIPOLAR_PX = 1.6  # of the working image
 OFF_GRID = 0.13  # of the grid's spacing: how far from a whole row and column a dot may seem to the laser
 GRID_SIGMA = 0.035
+LEAST_MISFIT = 0.01  # of the grid's spacing, by which the best calibrated dot is off
 NEIGHBOURS = 2  # rows and columns over which a surface holds together
+RELIEF = 0.055  # relative change of inverse depth from one dot to the next on one surface
 LEAST_SURFACE = 4
+AMBIGUOUS = 0.6  # support of another reading, over that of the best, from which neither is believed
+MOST_PAIRS = 64  # that one spot may be part of
 
 
 @dataclass(frozen=True)
@@ -127,14 +130,15 @@ def match_eyes(
     """Matches of two eyes and whether they are ambiguous. Rays (n, 3) with x = 1, each in its own camera's axes;
     sigmas (n,) are of their positions at focal length one."""
     eye = -stereo.rotation.T @ stereo.translation
-    w, miss, lever = inverse_depths(rays_left, rays_right @ stereo.rotation, eye)
-    near = np.abs(miss) < EPIPOLAR_PX / stereo.left.fx
-    left, right = np.nonzero(near & (w > 1 / FARTHEST_M) & (w < 1 / NEAREST_M))
-    depth = w[left, right]
-    points = rays_left[left] / depth[:, None]
-    place = grid_coordinates(points, laser)
-    sigma = np.hypot(sigma_left[left], sigma_right[right]) / lever[left, right]
-    return _consistent(left, right, depth, sigma, place, laser)
+    room = MOST_PAIRS * max(len(rays_left), 1)
+    index, value = np.empty((room, 4), np.int64), np.empty((room, 3))
+    count = pairs(
+        np.ascontiguousarray(rays_left), np.ascontiguousarray(rays_right @ stereo.rotation), eye,
+        EPIPOLAR_PX / stereo.left.fx, 1 / FARTHEST_M, 1 / NEAREST_M, np.ascontiguousarray(sigma_left),
+        np.ascontiguousarray(sigma_right), np.ascontiguousarray(laser.rotation.T), np.asarray(laser.position, float),
+        np.tan(np.asarray(laser.fan) / 2), np.array([laser.rows, laser.columns]), OFF_GRID, index, value,
+    )  # fmt: skip
+    return _surfaces(index[: max(count, 0)], value[: max(count, 0)], laser)
 
 
 def match_laser(rays: Array, laser: LaserGrid, focal_px: float, sigma: Array) -> tuple[Matches, bool]:
@@ -143,101 +147,44 @@ def match_laser(rays: Array, laser: LaserGrid, focal_px: float, sigma: Array) ->
     w, miss, lever = inverse_depths(rays, directions, laser.position)
     near = np.abs(miss) < 2.0 / focal_px
     left, ray = np.nonzero(near & (w > 1 / FARTHEST_M) & (w < 1 / NEAREST_M))
-    place = np.column_stack(np.divmod(ray, laser.columns)).astype(float)
-    depth = w[left, ray]
-    place[:, 0] += miss[left, ray] * focal_px / 30  # the misfit in units of the spacing, roughly
+    misfit = np.abs(miss[left, ray]) * focal_px / 30  # in units of the spacing, roughly
     spread = np.hypot(sigma[left], 0.3 / focal_px) / lever[left, ray]
-    return _consistent(left, np.full(len(left), -1), depth, spread, place, laser)
+    keep = misfit < OFF_GRID
+    index = np.column_stack([left, np.full(len(left), -1), *np.divmod(ray, laser.columns)])[keep]
+    return _surfaces(index, np.column_stack([w[left, ray], spread, misfit])[keep], laser)
 
 
-def _consistent(
-    left: Indices, right: Indices, depth: Array, sigma: Array, place: Array, laser: LaserGrid
-) -> tuple[Matches, bool]:
-    whole = np.rint(place)
-    misfit = np.hypot(*(place - whole).T) if len(place) else np.empty(0)
-    size = (laser.rows, laser.columns)
-    keep = (misfit < OFF_GRID) & (whole >= 0).all(axis=1) & (whole < size).all(axis=1)
-    row, column = whole[keep].astype(np.int64).T
-    candidates = Matches(
-        left[keep], right[keep], row, column, depth[keep], sigma[keep], misfit[keep], np.zeros(keep.sum(), np.int64)
-    )
-    return _surfaces(candidates)
-
-
-def _surfaces(candidates: Matches) -> tuple[Matches, bool]:
+def _surfaces(index: Indices, value: Array, laser: LaserGrid) -> tuple[Matches, bool]:
     """The candidates that can be true together, in surfaces, largest first, and whether another reading is as good."""
-    label = _components(candidates)
-    weight = np.exp(-0.5 * (candidates.misfit / GRID_SIGMA) ** 2) + 0.05
-    accepted: list[Matches] = []
-    best_rival = 0.0
-    alive = np.ones(len(candidates), bool)
-    number = 0
-    first_score = 0.0
-    while alive.any():
-        scores = np.bincount(label[alive], weight[alive])
-        best = int(np.argmax(scores))
-        members = np.flatnonzero(alive & (label == best))
-        alive[members] = False
-        members = _one_each(candidates, members)
-        if len(members) < LEAST_SURFACE:
-            break
-        clash = np.flatnonzero(
-            alive
-            & (
-                np.isin(candidates.left, candidates.left[members])
-                | (np.isin(candidates.right, candidates.right[members]) & (candidates.right >= 0))
-            )
-        )
-        if number == 0:
-            first_score = float(weight[members].sum())
-            if len(clash):
-                best_rival = float(np.bincount(label[clash], weight[clash]).max())
-        same_ray = np.isin(
-            candidates.row * 1000 + candidates.column, candidates.row[members] * 1000 + candidates.column[members]
-        )
-        alive[clash] = False
-        alive &= ~same_ray
-        surface = candidates.take(members)
-        accepted.append(
-            Matches(
-                surface.left,
-                surface.right,
-                surface.row,
-                surface.column,
-                surface.inverse_depth,
-                surface.sigma,
-                surface.misfit,
-                np.full(len(members), number, np.int64),
-            )
-        )
-        number += 1
-    if not accepted:
-        return candidates.take(np.zeros(len(candidates), bool)), False
-    joined = Matches(
-        *(np.concatenate(parts) for parts in zip(*(vars(part).values() for part in accepted), strict=True))
+    index, (w, sigma, misfit) = np.ascontiguousarray(index), np.ascontiguousarray(value.T)
+    label, surface = np.empty(len(index), np.int64), np.empty(len(index), np.int64)
+    row, column = np.ascontiguousarray(index[:, 2]), np.ascontiguousarray(index[:, 3])
+    number = components(row, column, w, sigma, laser.rows, laser.columns, NEIGHBOURS, RELIEF, label)
+    weight = np.exp(-0.5 * (misfit / GRID_SIGMA) ** 2) + 0.05
+    rival = surfaces(
+        index,
+        weight,
+        misfit,
+        label,
+        number,
+        laser.rows * laser.columns,
+        laser.columns,
+        LEAST_SURFACE,
+        LEAST_MISFIT,
+        surface,
     )
-    return joined, best_rival > 0.6 * first_score
+    kept = np.flatnonzero(surface >= 0)
+    kept = kept[np.argsort(surface[kept], kind="stable")]
+    matches = Matches(
+        index[kept, 0], index[kept, 1], row[kept], column[kept], w[kept], sigma[kept], misfit[kept], surface[kept]
+    )
+    return matches.take(_like_the_rest(matches)), bool(rival > AMBIGUOUS)
 
 
-def _components(candidates: Matches) -> Indices:
-    """Labels (n,) of groups of candidates whose neighbours in the grid lie at a like depth."""
-    row, column, w = candidates.row, candidates.column, candidates.inverse_depth
-    dr, dc = np.abs(row[:, None] - row), np.abs(column[:, None] - column)
-    steps = np.maximum(dr, dc)
-    size = np.maximum(w[:, None], w)
-    allowed = 0.055 * size * steps + 4 * np.hypot(candidates.sigma[:, None], candidates.sigma)
-    joined = (steps > 0) & (steps <= NEIGHBOURS) & (np.abs(w[:, None] - w) < allowed)
-    _, label = connected_components(csr_matrix(joined), directed=False)
-    return np.asarray(label, np.int64)
-
-
-def _one_each(candidates: Matches, members: Indices) -> Indices:
-    """Members with no spot and no ray used twice: the one that fits the grid best stays."""
-    order = members[np.argsort(candidates.misfit[members], kind="stable")]
-    for key in (candidates.left, candidates.right, candidates.row * 1000 + candidates.column):
-        values = key[order]
-        if (values < 0).all():
-            continue
-        _, first = np.unique(values, return_index=True)
-        order = order[np.sort(first)]
-    return np.sort(order)
+def _like_the_rest(matches: Matches) -> NDArray[np.bool_]:
+    """Which matches lie as near to the grid as the others of their surface do: the calibration's error is theirs, too,
+    and a spot that is no dot has no reason to share it."""
+    if len(matches) == 0:
+        return np.ones(0, bool)
+    usual = np.array([np.median(matches.misfit[matches.surface == k]) for k in range(matches.surface.max() + 1)])
+    return np.asarray(matches.misfit < 4 * usual[matches.surface] + GRID_SIGMA)

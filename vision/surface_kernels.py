@@ -1,0 +1,111 @@
+"""Inner loops of the surface fit: the plane that most dots agree on, and robust least squares from there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.compiled import compiled
+
+Array = NDArray[Any]  # of floats
+
+NEAR = 9  # dots that make a local plane, the middle one included
+ITERATIONS = 6
+
+
+@compiled
+def solve(matrix: Array, right: Array) -> None:
+    """Solve in place by Cholesky: right (n,) becomes the solution, the lower triangle of matrix (n, n) its factor."""
+    count = len(right)
+    for j in range(count):
+        for i in range(j, count):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = np.sqrt(max(total, 1e-300)) if i == j else total / matrix[j, j]
+    for i in range(count):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(count - 1, -1, -1):
+        for k in range(i + 1, count):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]
+
+
+@compiled
+def local_planes(terms: Array, values: Array, sigma: Array, planes: Array) -> None:
+    """Write planes (n, 3): least squares through each point and its nearest neighbours. terms (n, 3) = 1, y, z."""
+    count = len(terms)
+    size = min(NEAR, count)
+    near, distance = np.empty(size, np.int64), np.empty(size)
+    normal = np.empty((3, 3))
+    for n in range(count):
+        filled = 0
+        for m in range(count):
+            away = (terms[m, 1] - terms[n, 1]) ** 2 + (terms[m, 2] - terms[n, 2]) ** 2
+            if filled == size and away >= distance[size - 1]:
+                continue
+            at = min(filled, size - 1)
+            while at > 0 and distance[at - 1] > away:
+                distance[at], near[at] = distance[at - 1], near[at - 1]
+                at -= 1
+            distance[at], near[at] = away, m
+            filled = min(filled + 1, size)
+        normal[:] = 0.0
+        planes[n] = 0.0
+        for k in near:
+            weight = 1 / sigma[k] ** 2
+            for i in range(3):
+                planes[n, i] += weight * terms[k, i] * values[k]
+                for j in range(3):
+                    normal[i, j] += weight * terms[k, i] * terms[k, j]
+        loose = 1e-6 * (normal[0, 0] + normal[1, 1] + normal[2, 2])
+        for i in range(3):
+            normal[i, i] += loose
+        solve(normal, planes[n])
+
+
+@compiled
+def agreement(terms: Array, values: Array, sigma: Array, planes: Array, agrees: NDArray[np.bool_]) -> None:
+    """Write agrees (n, n): whether point m lies on plane n, roughly."""
+    for n in range(len(planes)):
+        a, b, c = planes[n, 0], planes[n, 1], planes[n, 2]
+        for m in range(len(terms)):
+            away = abs(values[m] - a - b * terms[m, 1] - c * terms[m, 2])
+            agrees[n, m] = away < 4 * sigma[m] + 0.02 * values[m]
+
+
+@compiled
+def robust(design: Array, values: Array, sigma: Array, held: Array, solution: Array, weight: Array) -> float:
+    """Iteratively reweighted least squares with Cauchy's weights, from solution (k,) on, in place; held (k,) is
+    information toward zero. Written: weight (n,); returned: the cost, squares of at most five sigma."""
+    count, unknowns = design.shape
+    normal, right = np.empty((unknowns, unknowns)), np.empty(unknowns)
+    for step in range(ITERATIONS):
+        loose = 2.5 * (4.0 if step == 0 else 1.5)
+        normal[:] = 0.0
+        right[:] = 0.0
+        for n in range(count):
+            residual = values[n]
+            for i in range(unknowns):
+                residual -= design[n, i] * solution[i]
+            weight[n] = 1 / sigma[n] ** 2 / (1 + (residual / sigma[n] / loose) ** 2) ** 2
+            for i in range(unknowns):
+                scaled = weight[n] * design[n, i]
+                right[i] += scaled * values[n]
+                for j in range(i + 1):
+                    normal[i, j] += scaled * design[n, j]
+        for i in range(unknowns):
+            normal[i, i] += held[i]
+        solve(normal, right)
+        solution[:] = right
+    cost = 0.0
+    for n in range(count):
+        residual = values[n]
+        for i in range(unknowns):
+            residual -= design[n, i] * solution[i]
+        cost += min(abs(residual) / sigma[n], 5.0) ** 2
+    return cost
