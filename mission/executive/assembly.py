@@ -243,7 +243,7 @@ def _compose(
         "knowledge": Keeping(options.folder.path, perception, log, threaded=not options.lockstep).run(stage.clock),
     }
     if stage.world is not None:
-        rehearsal = Rehearsal(stage.world, stage.switch, lambda: executive.state)
+        rehearsal = Rehearsal(stage.world, stage.switch, lambda: executive.state, beside=not options.lockstep)
         beside["faults"] = rehearsal.run(stage.clock)
     if stage.pace is not None:
         beside["pace"] = stage.pace.run()

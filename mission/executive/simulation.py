@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -52,35 +53,44 @@ def throw(switch: Switch, name: str, on: bool, fault: Any) -> None:
 class Rehearsal:
     """Puts the faults of the world into effect at their times: some on the vehicle, one on this program itself.
 
-    switch: None where the vehicle is no simulated one of ours, and its faults cannot be rehearsed.
+    switch: None where the vehicle is no simulated one of ours, and its faults cannot be rehearsed. `beside`: throw it
+    in a thread, since a vehicle in another process may take its time to answer.
     """
 
     world: World
     switch: Switch | None
     state: Callable[[], str]
+    beside: bool = False
     _on: dict[str, bool] = field(default_factory=dict)
     _path: str = ""
 
     async def run(self, clock: Clock) -> None:
         """Until cancelled."""
         while True:
-            self.step(clock.now())
+            for name, on, fault in self.step(clock.now()):
+                if self.switch is None:
+                    continue
+                if self.beside:
+                    await asyncio.to_thread(throw, self.switch, name, on, fault)
+                else:
+                    throw(self.switch, name, on, fault)
             await clock.sleep(PERIOD_S)
 
-    def step(self, now_s: float) -> None:
-        """Notice the state that the mission is in, and begin and end what is due."""
+    def step(self, now_s: float) -> list[tuple[str, bool, Any]]:
+        """Notice the state that the mission is in; the vehicle's faults that are due to begin or to end."""
         path = self.state()
         if path != self._path:
             self._path = path
             self.world.enter_state(path, now_s)
+        due = []
         for name in VEHICLE_FAULTS:
             on = self.world.faults.active(name, now_s)
             if on != self._on.get(name, False):
                 self._on[name] = on
-                if self.switch is not None:
-                    throw(self.switch, name, on, getattr(self.world.settings.faults, name))
+                due.append((name, on, getattr(self.world.settings.faults, name)))
         blocked = self.world.settings.faults.executive_blocked
         on = self.world.faults.active("executive_blocked", now_s)
         if on and not self._on.get("executive_blocked", False) and blocked is not None:
             time.sleep(blocked.for_s or 0.0)
         self._on["executive_blocked"] = on
+        return due

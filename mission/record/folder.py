@@ -94,10 +94,12 @@ def create(logs: Path, mission: str, resolved_yaml: str, needed_mb: int = NEEDED
         folder = RunFolder(path)
         folder.frames.mkdir()
         folder.telemetry.mkdir()
-        with folder.mission.open("w", encoding="utf-8") as file:
+        draft = folder.mission.with_suffix(".part")
+        with draft.open("w", encoding="utf-8") as file:
             file.write(resolved_yaml)
             file.flush()
             os.fsync(file.fileno())
+        draft.replace(folder.mission)  # a folder without it is no run
         log_line(folder, "run_created")
     except (OSError, RunFolderError) as error:
         if path is not None:
