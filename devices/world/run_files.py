@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from devices.recorded_mission import states_of
 from devices.torn_files import csv_rows, json_lines
 from devices.world.settings import WorldSettings
 from devices.world.truth import SHARP, Flight, Pass, Photograph
@@ -59,7 +60,9 @@ class RunFiles:
         shape = TurbineShape.of(document["turbine"], document["site"], settings.survey_error)
         reported = csv_rows(folder / "telemetry" / "telemetry.csv")
         flight = _flight(rows, _clock_offset(rows, reported))
-        follows = dict(_follows(document.get("states") or {}, ""))
+        follows = {
+            path: state.get("with") or {} for path, state in states_of(document) if state.get("do") == "follow_edge"
+        }
         journal = list(json_lines(folder / "journal.jsonl"))
         wanted = [state.get("standoff_m") for state in follows.values()]
         standoff = [float(value) for value in wanted if isinstance(value, int | float)]
@@ -144,16 +147,6 @@ def _clock_offset(rows: list[Mapping[str, str]], reported: list[Mapping[str, str
         best = min((best - step / 2, best, best + step / 2), key=misfit)
         step /= 2
     return best
-
-
-def _follows(states: Mapping[str, Any], above: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Path and parameters of every state that follows an edge."""
-    for name, state in states.items():
-        if isinstance(state, dict):
-            path = f"{above}.{name}" if above else name
-            if state.get("do") == "follow_edge":
-                yield path, state.get("with") or {}
-            yield from _follows(state.get("states") or {}, path)
 
 
 def _flown_until(flight: Flight, reported: list[Mapping[str, str]]) -> float:

@@ -42,7 +42,12 @@ _MOST_FAULTS = 3
 
 
 class Conductor:
-    """Carries every event to its end before it looks at the next. One task calls it, turn by turn."""
+    """Carries every event to its end before it looks at the next. One task calls it, turn by turn.
+
+    services: put behind a gate, in place, so that an abandoned behaviour cannot steer. ask: how an operator is asked;
+    without it a transition that needs a yes waits for `confirm`. resume: where an interrupted run goes on. gone:
+    whether the vehicle is known not to exist any more.
+    """
 
     def __init__(
         self,

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mission.behaviours.behaviour import behaviours
 from mission.executive.conductor import Conductor
-from mission.executive.decision import Autonomy
 from mission.executive.events import event
-from mission.executive.journal import SLOWEST_DISK_S, Journal
+from mission.executive.journal import SLOWEST_DISK_S
 from mission.executive.machine import entries
-from mission.executive.question import Ask
 from mission.executive.resume import take_up
 from mission.executive.status import Status, possible
-from mission.language.document import Mission
-from mission.language.semantics import Configuration
 
 if TYPE_CHECKING:
-    from mission.executive.clock import Clock
-    from mission.executive.services import Services
+    pass
 
 
 @dataclass(frozen=True)
@@ -37,31 +31,16 @@ class Outcome:
 class Executive(Conductor):
     """Flies a mission. `run` returns when the machine is in a final state; no behaviour can end it earlier.
 
-    services: put behind a gate, in place, so that an abandoned behaviour cannot steer. ask: how an operator is asked;
-    without it a transition that needs a yes waits for `confirm`. resume: where an interrupted run goes on. gone:
-    whether the vehicle is known not to exist any more.
+    Built as a Conductor is.
     """
 
-    def __init__(
-        self,
-        mission: Mission,
-        services: Services,
-        clock: Clock,
-        journal: Journal,
-        *,
-        ask: Ask | None = None,
-        autonomy: Autonomy = "full",
-        resume: Configuration | None = None,
-        gone: Callable[[], bool] = lambda: False,
-    ) -> None:
-        super().__init__(mission, services, clock, journal, ask=ask, autonomy=autonomy, resume=resume, gone=gone)
-        self.interrupted = False
-        self._loop: asyncio.AbstractEventLoop | None = None
-        journal.on_lost = self._journal_lost
+    interrupted = False
+    _loop: asyncio.AbstractEventLoop | None = None
 
     async def run(self) -> Outcome:
         """Fly until a final state is reached."""
         self._loop = asyncio.get_running_loop()
+        self._chronicle.journal.on_lost = self._journal_lost
         watching = self._loop.create_task(self._watcher.run(self._clock), name="monitors")
         watching.add_done_callback(self._monitors_ended)
         configuration = self._machine.configuration

@@ -3,7 +3,8 @@ goes on with others is told together with them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -12,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from devices.recorded_mission import states_of
 from devices.torn_files import csv_rows, json_lines
 from mission.record.folder import RunFolder
 from mission.record.lineage import lineage, reference
@@ -19,6 +21,10 @@ from mission.record.lineage import lineage, reference
 Line = Mapping[str, Any]
 INTERRUPTED = "interrupted"
 """By what a state was left in which the program was cut off, and another began."""
+
+
+def _is_time(value: object) -> bool:
+    return isinstance(value, int | float) and math.isfinite(value)
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,8 @@ class RunHistory:
     def journals(self) -> Sequence[Sequence[Line]]:
         """Every event, transition and memory of each part."""
         return [
-            [line for line in json_lines(part.journal) if {"seq", "t", "kind"} <= line.keys()] for part in self.parts
+            [line for line in json_lines(part.journal) if {"seq", "t", "kind"} <= line.keys() and _is_time(line["t"])]
+            for part in self.parts
         ]
 
     @cached_property
@@ -55,7 +62,7 @@ class RunHistory:
         """The resolved mission document."""
         try:
             document = yaml.load(self.folder.mission.read_text("utf-8"), Loader=yaml.CSafeLoader)
-        except (OSError, yaml.YAMLError):
+        except (OSError, ValueError, RecursionError, yaml.YAMLError):
             return {}
         return document if isinstance(document, dict) else {}
 
@@ -140,7 +147,7 @@ class RunHistory:
 
     def parameters_of(self, behaviour: str) -> Mapping[str, Any]:
         """`with` of the first state that runs this behaviour."""
-        for state in _states(self.mission.get("states") or {}):
+        for _, state in states_of(self.mission):
             if state.get("do") == behaviour:
                 given = state.get("with")
                 return given if isinstance(given, dict) else {}
@@ -180,10 +187,3 @@ def _entered(line: Line) -> str | None:
     if line["kind"] not in ("start", "transition"):
         return None
     return str(line["to"] if line["kind"] == "transition" else line["state"])
-
-
-def _states(states: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    for state in states.values():
-        if isinstance(state, dict):
-            yield state
-            yield from _states(state.get("states") or {})

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mission.executive import knowledge
 from mission.executive.knowledge import FILE, STALE_S, go_on_from, known, read_knowledge, write_knowledge
 from vision.camera import Camera
 from vision.capture import CameraPose
@@ -54,7 +53,7 @@ def kept(folder: Path, perception: Any, now_s: float) -> Any:
 def test_the_next_program_sees_the_blade_where_the_last_one_did(
     seen: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(knowledge.time, "time", lambda: 1000.0)
+    monkeypatch.setattr("mission.executive.knowledge.time.time", lambda: 1000.0)
     saved, after = kept(tmp_path, seen, 102.2), eye()
     assert go_on_from(after, saved, 102.2, speed=1.0)
     before, now = seen.tracker.estimate(102.2, POSE), after.tracker.estimate(102.2, POSE)
@@ -67,9 +66,9 @@ def test_the_next_program_sees_the_blade_where_the_last_one_did(
 def test_time_between_two_programs_makes_it_older_and_less_certain(
     seen: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(knowledge.time, "time", lambda: 1000.0)
+    monkeypatch.setattr("mission.executive.knowledge.time.time", lambda: 1000.0)
     saved, after = kept(tmp_path, seen, 102.0), eye()
-    monkeypatch.setattr(knowledge.time, "time", lambda: 1010.0)
+    monkeypatch.setattr("mission.executive.knowledge.time.time", lambda: 1010.0)
     assert go_on_from(after, saved, 50.0, speed=4.0)
     now = after.tracker.estimate(50.0, POSE)
     assert now.age_s == pytest.approx(40.0, abs=0.01)
@@ -81,9 +80,9 @@ def test_time_between_two_programs_makes_it_older_and_less_certain(
 def test_what_is_minutes_old_is_not_believed(
     seen: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elapsed_s: float, believed: bool
 ) -> None:
-    monkeypatch.setattr(knowledge.time, "time", lambda: 1e6)
+    monkeypatch.setattr("mission.executive.knowledge.time.time", lambda: 1e6)
     saved, after = kept(tmp_path, seen, 102.0), eye()
-    monkeypatch.setattr(knowledge.time, "time", lambda: 1e6 + elapsed_s)
+    monkeypatch.setattr("mission.executive.knowledge.time.time", lambda: 1e6 + elapsed_s)
     assert go_on_from(after, saved, 102.0, speed=1.0) is believed
     assert (after.tracker.estimate(102.0, POSE) is not None) is believed
 
