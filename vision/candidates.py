@@ -17,8 +17,8 @@ from vision.evidence import (
     missing,
     nearer_lines,
     parallax,
-    run_of,
     runs,
+    runs_at_focus,
     support_within,
     typical_step,
 )
@@ -74,11 +74,11 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     if len(rho) == 0:
         return []
     rough = _promising(normal, rho, blade, smooth, noise)
-    first = rough[0]
-    if len(first.rho) == 0:
+    seen = rough[0]
+    if len(seen.rho) == 0:
         return []
-    steps = typical_step(first, first.agrees)
-    nearer = nearer_lines(first, blade, smooth, steps, rough[1], rough[2], noise)
+    steps = typical_step(seen, seen.agrees)
+    nearer = nearer_lines(seen, blade, smooth, steps, rough[1], rough[2], noise)
     passes = [rough, _promising(*nearer, blade, smooth, noise)] if len(nearer[1]) else [rough]
     normal, rho = np.vstack([one[0].normal for one in passes]), np.concatenate([one[0].rho for one in passes])
     start, stop = np.concatenate([one[1] for one in passes]), np.concatenate([one[2] for one in passes])
@@ -105,9 +105,7 @@ def _same(one: Candidate, other: Candidate) -> bool:
     return abs(float(other.outward @ middle) - other.rho) < 3.0 and abs(float(one.outward @ theirs) - one.rho) < 3.0
 
 
-def _promising(
-    normal: Array, rho: Array, blade: Blade, smooth: Image, noise: float
-) -> tuple[Profiles, Array, Array]:
+def _promising(normal: Array, rho: Array, blade: Blade, smooth: Image, noise: float) -> tuple[Profiles, Array, Array]:
     """Lines refined for the first time, those that may be edges, and the stretch of each (low, high) (k,) that has both
     dots beside it and a step, or a step where none does."""
     dots = blade.dots
@@ -130,8 +128,7 @@ def _weighed(
     dots = blade.dots
     crossed = (dots @ profile.normal.T - profile.rho > 2.5).mean(axis=0)
     _, support = support_within(profile, low, high)
-    ends = [run_of(profile, k) for k in range(len(crossed))]
-    first, last = np.array(ends).T
+    first, last = runs_at_focus(profile)
     on_run = (profile.t >= first[:, None] - 1) & (profile.t <= last[:, None] + 1)
     step = typical_step(profile, on_run)
     told = np.full(len(crossed), np.nan)
@@ -142,27 +139,21 @@ def _weighed(
     apart = stop - start < LEAST_RUN
     start, stop = np.where(apart, first, start), np.where(apart, last, stop)
     before_run = blocked(profile, blade, smooth, step, start, stop, noise)
-    gaps = [missing(blade, profile.normal[k], float(profile.rho[k]), low[k], high[k]) for k in range(len(crossed))]
-    gaps_run = [
-        missing(blade, profile.normal[k], float(profile.rho[k]), start[k], stop[k]) for k in range(len(crossed))
-    ]
-    empties = np.array([gap[0] for gap in gaps])
-    likely = (before < 0.5) & ~(told < 0.4) & (empties < 0.3) & (support >= LEAST_SUPPORT)
+    empty, beyond = missing(blade, profile, low, high)
+    empty_run, beyond_run = missing(blade, profile, start, stop)
+    likely = (before < 0.5) & ~(told < 0.4) & (empty < 0.3) & (support >= LEAST_SUPPORT)
     strongest = max(float(np.max(np.where(likely, step, 0))), 1.0)
 
-    def sum_of(k: int, hidden: float, empty: float, beyond: int) -> float:
-        seen = float(told[k])
-        return float(
-            0.35 * float(np.clip(np.log2(step[k] / strongest), -3.0, 0.5))
-            + 0.35 * float(np.clip(np.log2(step[k] / max(blade.texture, 1.0)), -2.0, 1.0))
-            + (0.2 if np.isnan(seen) else 0.6 * seen if seen > 0.5 else -7.0 * (0.5 - seen))
-            - 2.0 * hidden
-            - 3.0 * max(hidden - 0.5, 0.0)
-            - (5.0 if blade.grid_known else 2.5) * empty
-            - 5.0 * crossed[k]
-            + 0.15 * min(beyond, 6)
-        )
+    clear = 0.35 * np.clip(np.log2(np.maximum(step, 1e-9) / strongest), -3.0, 0.5)
+    clear += 0.35 * np.clip(np.log2(np.maximum(step, 1e-9) / max(blade.texture, 1.0)), -2.0, 1.0)
+    clear += np.where(np.isnan(told), 0.2, np.where(told > 0.5, 0.6 * told, -7.0 * (0.5 - told))) - 5.0 * crossed
 
+    def sums(hidden: Array, empty: Array, beyond: Array) -> Array:
+        against = 2.0 * hidden + 3.0 * np.maximum(hidden - 0.5, 0.0) + (5.0 if blade.grid_known else 2.5) * empty
+        return np.asarray(clear - against + 0.15 * np.minimum(beyond, 6))
+
+    value = np.where(support >= LEAST_SUPPORT, 2.0 * support + sums(before, empty, beyond), -np.inf)
+    worth = sums(before_run, empty_run, beyond_run)
     return [
         Candidate(
             profile.normal[k],
@@ -171,11 +162,11 @@ def _weighed(
             float(told[k]),
             float(step[k]),
             float(before[k]),
-            gaps[k][0],
-            gaps[k][1],
-            ends[k],
-            2.0 * float(support[k]) + sum_of(k, before[k], *gaps[k]) if support[k] >= LEAST_SUPPORT else -np.inf,
-            sum_of(k, before_run[k], *gaps_run[k]),
+            float(empty[k]),
+            int(beyond[k]),
+            (float(first[k]), float(last[k])),
+            float(value[k]),
+            float(worth[k]),
             profile,
             k,
         )

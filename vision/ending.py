@@ -13,7 +13,8 @@ from vision.candidates import Candidate
 from vision.capture import Image
 from vision.ending_kernels import likeliest
 from vision.evidence import Blade
-from vision.lines import sampled, visible_stretch
+from vision.lines import visible_stretch
+from vision.profile_kernels import seen_in_lanes, steps_in_lanes
 
 Array = NDArray[Any]  # of floats
 
@@ -21,6 +22,7 @@ LANES = 25  # across the blade, from edge to edge
 STEP = 1.5  # px along a lane
 SLACK = 4  # samples by which an outline may miss the steps before it is fitted to them
 BOX, LONG_BOX = 4, 14  # samples averaged on either side of a step, and on either side to tell it from a streak
+NO_STREAK = (0.4, 0.6)  # of a step, and of the least one, that the longer samples have to show as well
 CORRELATED_PX = 8.0  # so far along an outline its steps tell the same
 SEEN, UNSEEN = 1.28, -2.0  # log of how much likelier an outline is to show a step, or none, than other places are
 CLOSED, OPEN = 1.4, -1.6  # the same where a lane ends
@@ -149,24 +151,17 @@ def fit_ending(
         return None
     shares = lane_shares()
     skew = blade.skew(last_dot * toward + middle * across, toward)
-    lanes = low.at(s) + shares[:, None] * (high.at(s) - low.at(s))
-    along_lanes = s + skew * (shares[:, None] - 0.5) * wide
-    u = along_lanes * toward[0] + lanes * across[0] + centre[0]
-    v = along_lanes * toward[1] + lanes * across[1] + centre[1]
-    outside = (u < 1) | (v < 1) | (u > width - 2) | (v > height - 2)
-    size, least = _steps_along(sampled(smooth, u, v), noise, usual, blade.texture)
-    size[outside] = 0.0
     # A lane may not end before the dots it carries.
     share_of = (aside - low.at(along)) / np.maximum(high.at(along) - low.at(along), 1.0)
     along = along - skew * (share_of - 0.5) * wide
     beside = np.abs(share_of[:, None] - shares) * wide < 4.0
     quiet = np.where(beside, along[:, None], -np.inf).max(axis=0) - 4.0
-    size[s[None] < quiet[:, None]] = 0.0
-    hidden = _strongest_before(size)
-    seen = np.clip(size / least - 0.5, 0.0, 1.0)
-    seen[(hidden > 1.3 * size) & (hidden > 1.5 * least)] *= 0.3
-    for _ in range(SLACK):
-        seen[:, 1:-1] = np.maximum(seen[:, 1:-1], 0.95 * np.maximum(seen[:, :-2], seen[:, 2:]))
+    least = max(3.0, 1.5 * noise, 0.2 * usual, 0.9 * blade.texture)
+    size, seen = np.empty((2, LANES, len(s)))
+    lower, upper = (np.array([side.offset, side.slope]) for side in sides)
+    boxes = (BOX, LONG_BOX)
+    steps_in_lanes(smooth, lower, upper, toward, skew * wide, shares, s, quiet, boxes, NO_STREAK, least, size)
+    seen_in_lanes(size, least, int(HIDDEN_PX / STEP), SLACK, seen)
     return _best(s, seen, size, sides, toward, blade, share_of, along, border, wide, skew)
 
 
@@ -200,7 +195,7 @@ def _best(
     lead = int(shift.max()) + 1
     ahead = s[0] + STEP * np.arange(-lead, len(s))
     k, top, evidence, share_top = likeliest(
-        np.ascontiguousarray(seen, np.float64),
+        seen,
         shift,
         np.rint(reach / STEP).astype(np.int64),
         PRIORS,
@@ -256,26 +251,3 @@ def _refined(
         fit = np.linalg.solve(information, (terms * weight[:, None]).T @ residual)
     sigma = float(np.sqrt(3 * np.linalg.inv(information)[0, 0]))
     return station + float(fit[0]), float(np.hypot(0.5, sigma))
-
-
-def _steps_along(strip: NDArray[np.float32], noise: float, usual: float, texture: float) -> tuple[Array, float]:
-    """Change (lanes, m) along each lane, that is no streak's, and how much counts as a step."""
-    short, long = _change(strip, BOX), _change(strip, LONG_BOX)
-    least = max(3.0, 1.5 * noise, 0.2 * usual, 0.9 * texture)
-    return np.where((long > 0.4 * short) & (long > 0.6 * least), short, 0.0), least
-
-
-def _change(strip: NDArray[np.float32], box: int) -> Array:
-    """Change (lanes, m) of the mean over `box` samples before and after each place, of the tone that changes most."""
-    padded = np.pad(strip, ((0, 0), (box, box), (0, 0)), mode="edge")
-    sums = np.cumsum(np.pad(padded, ((0, 0), (1, 0), (0, 0))), axis=1)
-    mean = (sums[:, box:] - sums[:, :-box]) / box
-    change: Array = np.abs(mean[:, box : box + strip.shape[1]] - mean[:, : strip.shape[1]]).max(axis=2)
-    return change
-
-
-def _strongest_before(size: Array) -> Array:
-    """The strongest step (lanes, m) in each lane that lies clearly before each place."""
-    back = int(HIDDEN_PX / STEP)
-    strongest = np.maximum.accumulate(size, axis=1)
-    return np.hstack([np.zeros((len(size), back)), strongest[:, :-back]])

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from vision.camera import StereoPair
 from vision.capture import Image
-from vision.lines import Profiles, sampled, steps
+from vision.evidence_kernels import longest_runs, median_steps, missing_dots, runs_about
+from vision.lines import Profiles, steps_along
 from vision.surface import Surface
 
 Array = NDArray[Any]  # of floats
@@ -20,6 +21,8 @@ LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
 ROUND_M = 1.0  # how far behind the surface before the camera a thick blade's edge may lie
 PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
 PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
+BEYOND_PX = 45.0  # so far past a line missing dots tell that the blade ends there
+RUN_PLACES = 7  # along a line, of which most must show a step
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ def texture_between(smooth: Image, dots: Array) -> float:
         return 0.0
     share = np.linspace(0.0, 1.0, 12)[:, None, None]
     points = dots[first] * (1 - share) + dots[second] * share
-    change = np.abs(steps(sampled(smooth, points[..., 0].T, points[..., 1].T)))
+    change = np.abs(steps_along(smooth, points[..., 0].T, points[..., 1].T))
     return float(np.quantile(change.max(axis=1), 0.8))
 
 
@@ -95,67 +98,37 @@ def beside(dots: Array, normal: Array) -> tuple[Array, Array]:
 
 def typical_step(profile: Profiles, within: NDArray[np.bool_]) -> Array:
     """Median height (k,) of the agreeing steps, in grey levels."""
-    steps = np.where(profile.agrees & within, np.abs(profile.step), np.nan)
-    none = ~np.isfinite(steps).any(axis=1)
-    steps[none] = 0.0
-    return np.asarray(np.nanmedian(steps, axis=1), float)
+    median = np.empty(len(within))
+    median_steps(profile.step, profile.agrees, within, median)
+    return median
 
 
 def runs(profile: Profiles) -> tuple[Array, Array]:
     """First and last place (k,) of the longest stretch of each line on which its step goes on with small gaps."""
-    t = profile.t
-    length = np.maximum(t[:, 1] - t[:, 0], 1e-6)
-    window = int(np.clip(round(28.0 / float(np.median(length))), 3, 9))
-    padded = np.pad(profile.agrees.astype(np.int64), ((0, 0), (window // 2 + 1, window // 2)))
-    sums = np.cumsum(padded, axis=1)
-    share = (sums[:, window:] - sums[:, :-window])[:, : t.shape[1]] / window
-    first, last = t[:, 0].copy(), t[:, 0].copy()
-    for k in range(len(t)):
-        good = np.flatnonzero((share[k] > 0.5) & profile.agrees[k])
-        if len(good) == 0:
-            continue
-        breaks = np.flatnonzero(np.diff(good) * length[k] > LONGEST_GAP)
-        starts, stops = np.r_[0, breaks + 1], np.r_[breaks, len(good) - 1]
-        longest = int(np.argmax(good[stops] - good[starts]))
-        first[k], last[k] = t[k, good[starts[longest]]], t[k, good[stops[longest]]]
+    first, last = np.empty((2, len(profile.t)))
+    if len(profile.t):
+        length = np.maximum(profile.t[:, 1] - profile.t[:, 0], 1e-6)
+        window = int(np.clip(round(28.0 / float(np.median(length))), 3, 9))
+        longest_runs(profile.t, profile.agrees, window, LONGEST_GAP, first, last)
     return first, last
 
 
-def run_of(profile: Profiles, k: int) -> tuple[float, float]:
-    """The places about its focus between which the steps of line k go on with small gaps."""
-    t, agrees, focus = profile.t[k], profile.agrees[k], float(profile.focus[k])
-    share = np.convolve(agrees, np.ones(7) / 7, mode="same") > 0.5
-    at = int(np.argmin(np.abs(t - focus)))
-    if not share[at]:
-        near = np.flatnonzero(share)
-        if len(near) == 0:
-            return float(t[0]), float(t[-1])
-        at = int(near[np.argmin(np.abs(near - at))])
-    length = t[1] - t[0]
-    first, last = at, at
-    for k in (np.flatnonzero(share[at:]) + at).tolist():
-        if (k - last) * length > LONGEST_GAP:
-            break
-        last = int(k)
-    for k in np.flatnonzero(share[: at + 1])[::-1].tolist():
-        if (first - k) * length > LONGEST_GAP:
-            break
-        first = int(k)
-    return float(t[first]), float(t[last])
+def runs_at_focus(profile: Profiles) -> tuple[Array, Array]:
+    """The places (k,) about each line's focus between which its steps go on with small gaps."""
+    first, last = np.empty((2, len(profile.t)))
+    runs_about(profile.t, profile.agrees, profile.focus, RUN_PLACES, LONGEST_GAP, first, last)
+    return first, last
 
 
-def missing(blade: Blade, normal: Array, rho: float, low: float, high: float) -> tuple[float, int]:
-    """Share of missing dots among those expected inside the line, beside the seen ones, and how many are missing
-    beyond."""
-    direction = np.array([-normal[1], normal[0]])
-    if len(blade.absent) == 0:
-        return 0.0, 0
-    along, distance = blade.absent @ direction, blade.absent @ normal - rho
-    near = (along > low - 10) & (along < high + 10)
-    innermost = float(np.median(blade.dots @ normal)) - rho
-    gone = int((near & (distance < -PLANE_PX) & (distance > innermost)).sum())
-    there = int((blade.dots @ normal - rho > innermost).sum())
-    return gone / max(gone + there, 1), int((near & (distance > PLANE_PX) & (distance < 45)).sum())
+def missing(blade: Blade, profile: Profiles, low: Array, high: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Share (k,) of missing dots among those expected inside each line, between low and high (k,) along it, and how
+    many (k,) are missing beyond."""
+    empty, beyond = np.zeros(len(low)), np.zeros(len(low), np.int64)
+    if len(blade.absent):
+        missing_dots(
+            blade.dots, blade.absent, profile.normal, profile.rho, low, high, PLANE_PX, BEYOND_PX, empty, beyond
+        )
+    return empty, beyond
 
 
 def blocked(
@@ -212,7 +185,7 @@ def _steps_before(profile: Profiles, blade: Blade, smooth: Image, low: Array, hi
     points = profile.normal[:, None] * profile.rho[:, None, None] + places[..., None] * profile.direction[:, None]
     u = points[..., 0, None] - inward * profile.normal[:, 0, None, None] + centre[0]
     v = points[..., 1, None] - inward * profile.normal[:, 1, None, None] + centre[1]
-    change = np.abs(steps(sampled(smooth, u, v)))
+    change = np.abs(steps_along(smooth, u, v))
     depth = (
         profile.rho[:, None]
         - np.sort(blade.dots @ profile.normal.T, axis=0)[round(0.85 * (len(blade.dots) - 1)), :, None]
@@ -249,7 +222,7 @@ def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], nois
     across = np.minimum(behind, 0) + (np.abs(behind) + 2 * PARALLAX_PX) * (reach + 1) / 2 - PARALLAX_PX
     u = there[..., 0, None] + across * profile.normal[:, 0, None, None]
     v = there[..., 1, None] + across * profile.normal[:, 1, None, None]
-    raw = steps(sampled(other.smooth, u, v))
+    raw = steps_along(other.smooth, u, v)
     gradient: Array = (raw + np.roll(raw, 1, 1) + np.roll(raw, -1, 1)) / 3
     middle = PARALLAX_SAMPLES // 2
     seen = (u[..., middle] > 4) & (v[..., middle] > 4)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.line_kernels import gradients, line_votes, median_roughness, refine, ridge
+from vision.gradient_kernels import gradients, line_votes, median_roughness, ridge
+from vision.profile_kernels import refine, steps_in_rows
 
 Array = NDArray[Any]  # of floats
 
@@ -70,13 +71,14 @@ def sampled(image: Image, u: Array, v: Array) -> NDArray[np.float32]:
     return np.asarray(values.reshape(*u.shape, -1), np.float32)
 
 
-def steps(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Central differences (…, n - 2) along the last but one axis of values (…, n, c): of the tone that changes most."""
-    change = values[..., 2:, :] - values[..., :-2, :]
-    if change.shape[-1] == 1:
-        return change[..., 0]
-    first, second = change[..., 0], change[..., 1]
-    return np.where(np.abs(first) >= np.abs(second), first, second)
+def steps_along(image: Image, u: Array, v: Array) -> Array:
+    """Central differences (…, n - 2) of an image (h, w, c) along rows of pixels u, v (…, n): of the tone that changes
+    most; the border continues outward."""
+    count = u.shape[-1]
+    change = np.empty((u.size // count, count - 2))
+    rows_u, rows_v = (np.ascontiguousarray(values, float).reshape(-1, count) for values in (u, v))
+    steps_in_rows(image, rows_u, rows_v, change)
+    return change.reshape(*u.shape[:-1], count - 2)
 
 
 def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Array, Array]:

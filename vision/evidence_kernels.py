@@ -1,0 +1,124 @@
+"""Inner loops over what speaks for lines: their typical steps, the runs of these, missing dots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.compiled import compiled
+
+Floats = NDArray[Any]
+Flags = NDArray[np.bool_]
+
+
+@compiled
+def median_steps(step: Floats, agrees: Flags, within: Flags, median: Floats) -> None:
+    """Median (k,) of |step| (k, m) at the places that agree and lie within (k, m); zero where there is none."""
+    lines, places = step.shape
+    sizes = np.empty(places)
+    for line in range(lines):
+        count = 0
+        for m in range(places):
+            if agrees[line, m] and within[line, m]:
+                sizes[count] = abs(step[line, m])
+                count += 1
+        median[line] = 0.0
+        if count > 0:
+            ordered = np.sort(sizes[:count])
+            median[line] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
+
+
+@compiled
+def _dense(agrees: Flags, window: int, dense: Flags) -> None:
+    """Whether more than half of the `window` places about each place agree."""
+    places = len(agrees)
+    for m in range(places):
+        count = 0
+        for i in range(max(m - window // 2, 0), min(m - window // 2 + window, places)):
+            count += agrees[i]
+        dense[m] = 2 * count > window
+
+
+@compiled
+def longest_runs(t: Floats, agrees: Flags, window: int, gap: float, first: Floats, last: Floats) -> None:
+    """First and last place (k,) of the longest stretch of each line, at places t (k, m), on which steps go on with gaps
+    no longer than `gap`; the line's first place twice where there is none."""
+    lines, places = t.shape
+    dense = np.empty(places, np.bool_)
+    for line in range(lines):
+        _dense(agrees[line], window, dense)
+        length = max(t[line, 1] - t[line, 0], 1e-6)
+        start, stop, best_start, best_stop = -1, -1, 0, 0
+        for m in range(places):
+            if not (dense[m] and agrees[line, m]):
+                continue
+            if start < 0 or (m - stop) * length > gap:
+                start = m
+            stop = m
+            if stop - start > best_stop - best_start or best_stop == 0:
+                best_start, best_stop = start, stop
+        first[line], last[line] = t[line, best_start], t[line, best_stop]
+
+
+@compiled
+def runs_about(t: Floats, agrees: Flags, focus: Floats, window: int, gap: float, first: Floats, last: Floats) -> None:
+    """First and last place (k,) between which each line's steps go on about its focus (k,) with gaps no longer than
+    `gap`; the whole line where steps are nowhere dense."""
+    lines, places = t.shape
+    dense = np.empty(places, np.bool_)
+    for line in range(lines):
+        _dense(agrees[line], window, dense)
+        at = 0
+        for m in range(places):
+            if abs(t[line, m] - focus[line]) < abs(t[line, at] - focus[line]):
+                at = m
+        nearest = -1
+        for m in range(places):
+            if dense[m] and (nearest < 0 or abs(m - at) < abs(nearest - at)):
+                nearest = m
+        if nearest < 0:
+            first[line], last[line] = t[line, 0], t[line, places - 1]
+            continue
+        length = t[line, 1] - t[line, 0]
+        start = stop = nearest
+        for m in range(nearest, places):
+            if (m - stop) * length > gap:
+                break
+            if dense[m]:
+                stop = m
+        for back in range(nearest + 1):
+            m = nearest - back
+            if (start - m) * length > gap:
+                break
+            if dense[m]:
+                start = m
+        first[line], last[line] = t[line, start], t[line, stop]
+
+
+@compiled
+def missing_dots(
+    dots: Floats, absent: Floats, normal: Floats, rho: Floats, low: Floats, high: Floats, apart: float, reach: float,
+    empty: Floats, beyond: NDArray[np.int64],
+) -> None:  # fmt: skip
+    """Of dots expected inside of k lines, between low and high (k,) along them, the share that is missing, and how many
+    are missing up to `reach` px past them. dots (n, 2), absent (m, 2); nearer than `apart` to the line neither counts.
+    """
+    depth = np.empty(len(dots))
+    for line in range(len(rho)):
+        nx, ny = normal[line, 0], normal[line, 1]
+        for k in range(len(dots)):
+            depth[k] = dots[k, 0] * nx + dots[k, 1] * ny - rho[line]
+        ordered = np.sort(depth)
+        innermost = 0.5 * (ordered[(len(dots) - 1) // 2] + ordered[len(dots) // 2])
+        there, gone, past = 0, 0, 0
+        for k in range(len(dots)):
+            there += depth[k] > innermost
+        for k in range(len(absent)):
+            along = absent[k, 1] * nx - absent[k, 0] * ny
+            if low[line] - 10 < along < high[line] + 10:
+                off = absent[k, 0] * nx + absent[k, 1] * ny - rho[line]
+                gone += innermost < off < -apart
+                past += apart < off < reach
+        empty[line], beyond[line] = gone / max(gone + there, 1), past
