@@ -41,10 +41,16 @@ def annotated(image: Image, seen: BladeObservation) -> Image:
         middle = edge.ends.mean(axis=0) + centre
         cv2.arrowedLine(canvas, at(middle), at(middle + 24 * unit / zoom * edge.outward), EDGE, 2 * unit, cv2.LINE_AA)
     if seen.tip is not None:
+        normal = np.array([np.cos(seen.tip.line.theta), np.sin(seen.tip.line.theta)])
+        foot = seen.tip.point + normal * (seen.tip.line.rho - float(seen.tip.point @ normal))
+        reach = 30 * unit / zoom * np.array([-normal[1], normal[0]])
+        cv2.line(canvas, at(foot - reach + centre), at(foot + reach + centre), TIP, 2 * unit, cv2.LINE_AA)
         cv2.circle(canvas, at(seen.tip.point + centre), 8 * unit, TIP, 2 * unit, cv2.LINE_AA)
     for line, text in enumerate(_lines(seen)):
-        place = (8 * unit, (18 + 16 * line) * unit)
-        cv2.putText(canvas, text, place, 0, 0.45 * unit, (0, 0, 0), 3 * unit, cv2.LINE_AA)
+        place = (8 * unit, (18 + 18 * line) * unit)
+        (wide, high), below = cv2.getTextSize(text, 0, 0.45 * unit, unit)
+        corner, opposite = (place[0] - 4 * unit, place[1] - high - 3 * unit), (place[0] + wide, place[1] + below)
+        cv2.rectangle(canvas, corner, opposite, (0, 0, 0), cv2.FILLED)
         cv2.putText(canvas, text, place, 0, 0.45 * unit, TEXT, unit, cv2.LINE_AA)
     return np.asarray(canvas, np.uint8)
 

@@ -1,4 +1,4 @@
-"""Kalibr's camchain YAML, read and written as the stereo pair of `vision.camera`.
+"""Kalibr's camchain YAML, as text, from and to the stereo pair of `vision.camera`.
 
 A camchain holds the left camera as cam0 and the right one as cam1 with T_cn_cnm1, the rigid motion of points from cam0
 to cam1. Its axes are OpenCV's (x right, y down, z forward); here they are x forward, y right, z down.
@@ -6,7 +6,6 @@ to cam1. Its axes are OpenCV's (x right, y down, z forward); here they are x for
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,6 @@ Array = NDArray[np.float64]
 
 FROM_OPENCV = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """(3, 3): a vector in OpenCV's camera axes in this project's camera axes."""
-
-LARGEST_FILE = 65536
 
 
 class CamchainError(ValueError):
@@ -39,23 +36,6 @@ def opencv_motion(stereo: StereoPair) -> tuple[Array, Array]:
     """Rotation (3, 3) and translation (3,) m from left to right in OpenCV's axes."""
     turn = FROM_OPENCV
     return turn.T @ stereo.rotation @ turn, turn.T @ stereo.translation
-
-
-def read_camchain(path: Path) -> StereoPair:
-    """The stereo pair of a camchain file.
-
-    Raises:
-        CamchainError: it cannot be read, or says something impossible.
-    """
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise CamchainError(f"{path}: {path.stat().st_size} bytes is too large for a camchain")
-        text = path.read_text("utf-8")
-    except OSError as error:
-        raise CamchainError(f"{path}: {(error.strerror or str(error)).lower()}") from None
-    except UnicodeDecodeError:
-        raise CamchainError(f"{path}: not a text file") from None
-    return parse_camchain(text, str(path))
 
 
 def parse_camchain(text: str, name: str = "camchain") -> StereoPair:
@@ -106,13 +86,6 @@ def format_camchain(stereo: StereoPair) -> str:
             f"  rostopic: /cam{number}/image_raw",
         ]
     return "\n".join(lines) + "\n"
-
-
-def write_camchain(path: Path, stereo: StereoPair) -> None:
-    """Write a camchain file, whole or not at all."""
-    draft = path.with_name(path.name + ".part")
-    draft.write_text(format_camchain(stereo), "utf-8")
-    draft.replace(path)
 
 
 class _Section:
@@ -166,7 +139,7 @@ def _camera(section: _Section) -> Camera:
         ("distortion_model", "radtan", "calibrate with pinhole-radtan"),
     ):
         model = section.value(key, known)
-        if model != known:
+        if model != known and (key, model) != ("distortion_model", "none"):
             raise section.wrong(key, f"{str(model)[:40]!r} is not known; {known} is: {remedy}")
     width, height = section.numbers("resolution", (2,), "[width, height] in pixels")
     if not (16 <= width <= 20000 and 16 <= height <= 20000 and width == int(width) and height == int(height)):
@@ -176,7 +149,9 @@ def _camera(section: _Section) -> Camera:
         raise section.wrong("intrinsics", f"focal lengths {fx:g} and {fy:g} px do not fit a width of {width:g} px")
     if not (0 <= cx <= width and 0 <= cy <= height):
         raise section.wrong("intrinsics", f"the principal point ({cx:g}, {cy:g}) lies outside the image")
-    k1, k2, p1, p2 = section.numbers("distortion_coeffs", (4,), "[k1, k2, p1, p2]")
+    k1 = k2 = p1 = p2 = 0.0
+    if section.value("distortion_model", "radtan") != "none":
+        k1, k2, p1, p2 = section.numbers("distortion_coeffs", (4,), "[k1, k2, p1, p2]")
     return Camera(int(width), int(height), fx, fy, cx, cy, (float(k1), float(k2), float(p1), float(p2)))
 
 

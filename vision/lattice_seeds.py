@@ -20,7 +20,7 @@ def frames_of(uv: Array, level: Array) -> list[tuple[int, int, Array]]:
     that lead to others on both sides, and how many of the eight places around are taken."""
     tree = cKDTree(uv)
     found = []
-    nearby: list[list[int]] = list(tree.query_ball_point(uv, MOST_STEP))
+    nearby: Any = tree.query_ball_point(uv, MOST_STEP)
     for spot, near in enumerate(nearby):
         others = np.array([k for k in near if k != spot], np.int64)
         if len(others) < 3:

@@ -90,10 +90,10 @@ def _stereo(
 ) -> None:
     from dataclasses import replace
 
+    from devices.camchain_file import write_camchain
     from mission.cli.calibration_files import DataSheet, find_boards, nominal_of, read_corners
     from vision.calibration import calibrate_stereo
     from vision.calibration_report import coverage_picture, stereo_text
-    from vision.camchain import write_camchain
 
     if source.is_dir():
         views, given = find_boards(source, board), DataSheet()
@@ -117,11 +117,11 @@ def _stereo(
 def _laser(source: Path, camchain: Path | None, rows: int, columns: int, fan_deg: float, report: Path | None) -> None:
     import numpy as np
 
+    from devices.camchain_file import read_camchain
     from mission.cli.calibration_files import read_walls
     from mission.cli.errors import CommandError
     from vision.calibration_laser import fit_laser
     from vision.calibration_report import laser_text
-    from vision.camchain import read_camchain
     from vision.camera import LaserGrid
 
     if camchain is None:

@@ -55,7 +55,7 @@ def rig_geometry(rig: RigFile, folder: Path) -> RigGeometry:
         ValueError: the camchain cannot be read; one line for a person.
     """
     if rig.camchain is not None:
-        from vision.camchain import read_camchain
+        from devices.camchain_file import read_camchain
 
         stereo = read_camchain(folder / rig.camchain)
     else:

@@ -12,7 +12,8 @@ import yaml
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from vision.camchain import CamchainError, format_camchain, parse_camchain, read_camchain, write_camchain
+from devices.camchain_file import read_camchain, write_camchain
+from vision.camchain import CamchainError, format_camchain, parse_camchain
 from vision.camera import Camera, StereoPair
 from vision.capture import rotation_of
 

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
+from devices.camchain_file import read_camchain
 from mission.cli.main import main
-from vision.camchain import read_camchain
 from vision.camera import Camera, LaserGrid, StereoPair
 from vision.capture import rotation_of
 
