@@ -3,29 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.blade_model import EDGE, PLANE, SIZE, BladeModel, Side, TrackerSettings
+from vision.blade_model import BladeModel
+from vision.blade_motion import (
+    ACROSS_CURVATURE,
+    BLADE,
+    DEPTH_CURVATURE,
+    EDGE,
+    EDGE_CURVATURE,
+    PLANE,
+    RECESS,
+    SIZE,
+    TREMBLE,
+    TWIST,
+    Side,
+    alike_m,
+    curvature_sigmas,
+    led_to,
+    shifted,
+)
 from vision.camera import Camera
 from vision.capture import CameraPose
 from vision.estimate import BladeFrame
 from vision.observation import BladeObservation, Edge
+from vision.tracker_settings import TrackerSettings
 
 Array = NDArray[np.float64]
-PATCH_M = 3.0  # distance for which the settings say how far a surface is from a plane
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """One linearised measurement: z = H x + noise of covariance R. parts: name → rows, the surface first."""
+    """One linearised measurement (m,): z = H x + noise of covariance R. turning (m, 3): what an error of the camera's
+    angles (rad, camera frame) does to it. parts: name → rows, the surface first."""
 
     z: Array
     H: Array
     R: Array
+    turning: Array
     parts: dict[str, slice]
+
+    def before(self, seconds: float, jitter_m: float, settings: TrackerSettings) -> Measurement:
+        """The same, taken so long before the state's own time: the vehicle trembled otherwise then."""
+        alike = float(np.exp(-seconds / settings.jitter_s))
+        place = self.H[:, TREMBLE]
+        H = self.H.copy()
+        H[:, TREMBLE] = alike * place
+        return replace(self, H=H, R=self.R + (1 - alike**2) * jitter_m**2 * place @ place.T)
 
 
 def image_plane(theta: float, rho: float, camera: Camera) -> Array:
@@ -80,12 +107,16 @@ def measure(
     frame: BladeFrame,
     model: BladeModel,
     settings: TrackerSettings,
+    attitude: float,
 ) -> Measurement:
     """The observation's plane (or distance alone) and edges as one measurement of the model's state, linearised around
     it.
 
     An edge in the image is a plane through the lens; where it cuts the *modelled* surface lies the measured edge, so
-    that its rows depend on the state's surface too. Errors of the camera's pose are common to all rows.
+    that its rows depend on the state's surface too, and on how far behind it the edge of a round blade lies. A line
+    fitted to a curved edge has the edge's slope where the fitted stretch has its middle, not at the reference; the same
+    holds for the plane and the dots. Errors of the camera's angles, of sigma `attitude` (rad), are common to all
+    rows.
     """
     assert observation.distance_m is not None
     sides = list(edges)
@@ -96,25 +127,23 @@ def measure(
         surface = np.array([observation.distance_m])
         surface_covariance = np.array([[(observation.distance_sigma_m or 0.1) ** 2]])
     lines = np.array([straightened(edges[side], camera) for side in sides]).reshape(-1)
-    position = np.zeros(3)
-    turned = np.zeros(3)
-    seen = np.concatenate([surface, lines, position, turned])
+    seen = np.concatenate([surface, lines, np.zeros(3)])
     size = len(surface)
     noise = np.zeros((len(seen), len(seen)))
     noise[:size, :size] = surface_covariance
     for i, side in enumerate(sides):
         rows = slice(size + 2 * i, size + 2 * i + 2)
         noise[rows, rows] = np.diag([edges[side].sigma_theta ** 2, edges[side].sigma_rho_px ** 2])
-    noise[-6:-3, -6:-3] = np.eye(3) * pose.sigma_m**2
-    noise[-3:, -3:] = np.eye(3) * settings.attitude_sigma**2
+    noise[-3:, -3:] = np.eye(3) * attitude**2
 
-    to_blade = frame.rotation
-    camera_to_blade = to_blade @ pose.rotation
-    lens_here = frame.to_blade(pose.position)
+    camera_to_blade = frame.rotation @ pose.rotation
+    lens = frame.to_blade(pose.position)
+    shown = model.as_shown()
+    plane = shown.mean[PLANE]
+    stretches = [stretch(edges[side], camera, camera_to_blade, lens, shown) for side in sides]
     reference = np.array([model.station, model.offset])
 
     def in_blade_frame(seen: Array, plane: Array) -> Array:
-        lens = lens_here + to_blade @ seen[-6:-3]
         rotation = camera_to_blade @ small_rotation(seen[-3:])
         result = np.empty(size + 2 * len(sides))
         hit = lens + rotation[:, 0] * seen[0]
@@ -123,40 +152,73 @@ def measure(
         result[0] = hit[2] + slopes @ (reference - hit[:2])
         if size == 3:
             result[1:3] = slopes
-        for i in range(len(sides)):
+        for i, (station, _) in enumerate(stretches):
             cut = rotation @ image_plane(seen[size + 2 * i], seen[size + 2 * i + 1], camera)
             lean = cut[1] + cut[2] * plane[2]
-            at_reference = cut[0] * (model.station - lens[0]) + cut[2] * (plane[0] - plane[2] * model.offset - lens[2])
-            result[size + 2 * i] = (cut[1] * lens[1] - at_reference) / lean
+            depth = plane[0] + plane[1] * (station - model.station) - plane[2] * model.offset
+            result[size + 2 * i] = (cut[1] * lens[1] - cut[0] * (station - lens[0]) - cut[2] * (depth - lens[2])) / lean
             result[size + 2 * i + 1] = -(cut[0] + cut[2] * plane[1]) / lean
         return result
 
-    plane = model.mean[PLANE]
     value = in_blade_frame(seen, plane)
     by_seen = jacobian(lambda p: in_blade_frame(p, plane), seen)
     by_plane = jacobian(lambda p: in_blade_frame(seen, p), plane)
+    shift = shifted(model.mean)
     H = np.zeros((len(value), SIZE))
-    H[:size, :size] = np.eye(size)
-    # The dots cover more of a round surface from farther away, and a plane fits that the worse.
-    wide = max(observation.distance_m / PATCH_M, 1.0)
-    left_out = [settings.surface_sigma_m * wide**2, *[settings.surface_slope_sigma * wide] * 2][:size]
+    H[:size, BLADE] = np.eye(size, 7)
+    H[0, TREMBLE] = shift[0]
+    spread = 0.0
+    if observation.points is not None and len(observation.points) > 2:
+        dots = observation.points @ camera_to_blade.T + lens
+        spread = float(dots[:, 1].std())
+        if size == 3:
+            along, across = dots[:, :2].mean(axis=0) - reference
+            slope = led_to(along, alike_m(model.station, settings))[1]
+            H[1, [DEPTH_CURVATURE, TWIST]] = slope, across
+            H[2, [TWIST, ACROSS_CURVATURE]] = slope, led_to(across, settings.alike_across_m)[1]
+    bend = settings.surface_bend * curvature_sigmas(model.station, settings)[ACROSS_CURVATURE] * spread
+    left_out = [np.hypot(settings.surface_sigma_m, bend * spread)]
+    left_out += [settings.surface_slope_sigma, np.hypot(settings.surface_slope_sigma, bend)][: size - 1]
     parts = {"surface": slice(0, size)}
     for i, side in enumerate(sides):
         rows = slice(size + 2 * i, size + 2 * i + 2)
-        H[rows, EDGE[side]] = np.eye(2)
+        station, length = stretches[i]
+        place, slope, _ = led_to(station - model.station, alike_m(station, settings))
+        start, curvature = EDGE[side].start, EDGE_CURVATURE[side]
+        H[rows, start] = 1.0, 0.0
+        H[rows, start + 1] = station - model.station, 1.0
+        # A line through a bent edge runs beside its middle, by half of the third of how far its ends bend away.
+        H[rows, curvature] = place + length**2 / 24, slope
+        H[rows, TREMBLE] = shift[start : start + 2] - by_plane[rows] @ shift[PLANE]
         H[rows, PLANE] = -by_plane[rows]
         left_out += [settings.edge_sigma_m, settings.edge_slope_sigma]
-        # An edge lies behind the middle of a round surface: seen from aside that shifts it.
-        left_out[-2] = np.hypot(left_out[-2], by_plane[rows.start, 0] * settings.edge_depth_sigma_m)
+        H[rows, RECESS[side]] = -by_plane[rows, 0]
         parts[side] = rows
     if size == 1:
         H[0, PLANE] -= by_plane[0]
     R = by_seen @ noise @ by_seen.T + np.diag(np.square(left_out))
     z = value.copy()
-    z[size:] += H[size:, PLANE] @ plane
+    z[size:] -= by_plane[size:] @ plane
     if size == 1:
         z[0] -= by_plane[0] @ plane
-    return Measurement(z, H, R, parts)
+    return Measurement(z, H, R, by_seen[:, -3:], parts)
+
+
+def stretch(edge: Edge, camera: Camera, rotation: Array, lens: Array, model: BladeModel) -> tuple[float, float]:
+    """(station of the middle, length along the span) in metres of the stretch of an edge that was seen, where it lies
+    on the modelled surface; the reference's station and no length where it does not.
+
+    rotation (3, 3), lens (3,): camera to blade coordinates.
+    """
+    depth, along, across = model.mean[PLANE]
+    rays = camera.rays(edge.ends + camera.centre) @ rotation.T
+    gradient = np.array([-along, -across, 1.0])
+    closing = rays @ gradient
+    behind = (np.array([model.station, model.offset, depth]) - lens) @ gradient
+    if not (closing > 0.1).all() or behind <= 0:
+        return model.station, 0.0
+    stations = lens[0] + rays[:, 0] * behind / closing
+    return float(stations.mean()), float(np.ptp(stations))
 
 
 def small_rotation(angles: Array) -> Array:

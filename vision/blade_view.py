@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.blade_model import ACROSS_SLOPE, EDGE, PLANE, SIDES, SIGN, BladeModel, Side
+from vision.blade_model import BladeModel
+from vision.blade_motion import ACROSS_SLOPE, BLADE, DEPTH, EDGE, PLANE, RECESS, SIDES, SIGN, Side
 from vision.camera import Camera
 from vision.capture import CameraPose
 from vision.estimate import BladeEstimate, BladeFrame, SideEstimate
@@ -18,23 +19,32 @@ REACH_M = 4.0  # an edge is drawn where it lies within this much of station of t
 
 
 def view(
-    model: BladeModel, frame: BladeFrame, pose: CameraPose, camera: Camera, stamp_s: float, ages: Mapping[str, float]
+    model: BladeModel,
+    frame: BladeFrame,
+    pose: CameraPose,
+    camera: Camera,
+    stamp_s: float,
+    ages: Mapping[str, float],
+    left_out_m: float = 0.0,
 ) -> BladeEstimate:
     """The estimate at the model's reference point, which must lie where the camera looks (see `look_at`).
 
-    ages: seconds since 'surface' and each side were last seen; a side without one has not been seen.
+    ages: seconds since 'surface' and each side were last seen; a side without one has not been seen. left_out_m: sigma
+    of the surface around the modelled plane. What is seen from the lens (distances, lines) is as the camera shows it at
+    this moment; what lies in local NED is without the trembling of the vehicle's position.
     """
+    shown = model.as_shown()
     depth, along, across = model.mean[PLANE]
     here = np.array([model.station, model.offset, depth])
     lens = frame.to_blade(pose.position)
     axis = frame.rotation @ pose.rotation[:, 0]
     gradient = np.array([-along, -across, 1.0])
-    distance = float(np.linalg.norm(here - lens))
     steepness = max(float(axis @ gradient), 0.1)
-    distance_sigma = float(np.sqrt(model.covariance[0, 0])) / steepness
+    distance = float(np.linalg.norm(np.array([model.station, model.offset, shown.mean[DEPTH]]) - lens))
+    distance_sigma = float(np.hypot(np.sqrt(shown.covariance[DEPTH, DEPTH]), left_out_m)) / steepness
     seen = {side: ages[side] for side in SIDES if side in ages}
     point = frame.to_ned(here)
-    direction, sigma = heading(model, seen, frame, pose)
+    direction, sigma = heading(shown, seen, frame, pose)
     chord, chord_sigma = None, None
     if len(seen) == 2:
         width = np.zeros(len(model.mean))
@@ -48,39 +58,45 @@ def view(
         station_m=model.station,
         distance_m=distance,
         distance_sigma_m=distance_sigma,
-        nearest_m=nearest(model, seen, lens),
+        nearest_m=nearest(shown, seen, lens),
         normal=-(gradient @ frame.rotation) / np.linalg.norm(gradient),
         point=point,
         depth_m=float(depth),
         depth_slope=float(along),
         across_slope=float(across),
-        leading=side_estimate("leading", model, seen, frame, pose, camera),
-        trailing=side_estimate("trailing", model, seen, frame, pose, camera),
+        leading=side_estimate("leading", model, shown, seen, frame, pose, camera),
+        trailing=side_estimate("trailing", model, shown, seen, frame, pose, camera),
         heading=direction,
         heading_sigma=sigma,
         chord_m=chord,
         chord_sigma_m=chord_sigma,
-        state=model.mean,
-        covariance=model.covariance,
+        state=model.mean[BLADE],
+        covariance=model.covariance[BLADE, BLADE],
     )
 
 
 def edge_points(model: BladeModel, side: Side, stations: Array) -> Array:
-    """Points (n, 3) of an edge in blade coordinates."""
+    """Points (n, 3) of the surface at an edge, in blade coordinates."""
     offsets = np.array([model.edge_at(side, station) for station in stations])
     depths = [model.depth_at(station, offset) for station, offset in zip(stations, offsets, strict=True)]
     return np.column_stack([stations, offsets, depths])
 
 
 def side_estimate(
-    side: Side, model: BladeModel, ages: Mapping[Side, float], frame: BladeFrame, pose: CameraPose, camera: Camera
+    side: Side,
+    model: BladeModel,
+    shown: BladeModel,
+    ages: Mapping[Side, float],
+    frame: BladeFrame,
+    pose: CameraPose,
+    camera: Camera,
 ) -> SideEstimate | None:
-    """One edge with the line it makes in the image; None where it was never seen."""
+    """One edge with the line it makes in the image of the blade as `shown`; None where it was never seen."""
     if side not in ages:
         return None
     offset, slope = model.mean[EDGE[side]]
     sigmas = np.sqrt(np.diag(model.covariance)[EDGE[side]])
-    line, outward = edge_line(model, side, frame, pose, camera)
+    line, outward = edge_line(shown, side, frame, pose, camera)
     return SideEstimate(float(offset), float(slope), float(sigmas[0]), float(sigmas[1]), ages[side], line, outward)
 
 
@@ -89,6 +105,7 @@ def edge_line(
 ) -> tuple[Line | None, Array | None]:
     """The edge's line and outward normal (2,) in the image, (None, None) where it is behind the camera."""
     ends = edge_points(model, side, model.station + np.linspace(-REACH_M, REACH_M, 17))
+    ends[:, 2] += model.mean[RECESS[side]]
     points = pose.from_ned(frame.to_ned(ends))
     pixels = camera.project(points[points[:, 0] > 0.3]) - camera.centre
     if len(pixels) < 2:

@@ -5,48 +5,26 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
-from vision.blade_measurement import Measurement, look_at, measure, side_of
-from vision.blade_model import (
-    EDGE,
-    PLANE,
-    SIDES,
-    BladeModel,
-    Side,
-    TrackerSettings,
-    prior,
-)
+from vision.blade_gate import BladeGate, UpdateResult
+from vision.blade_measurement import look_at
+from vision.blade_model import BladeModel, prior
+from vision.blade_motion import EDGE, PLANE, SIDES, Side
 from vision.blade_view import view
 from vision.camera import Camera
 from vision.capture import CameraPose
 from vision.estimate import BladeEstimate, BladeFrame
 from vision.observation import BladeObservation, Edge
+from vision.tracker_settings import TrackerSettings
+from vision.tremble import Tremble
 
 __all__ = ["BladeTracker", "Kept", "TrackerSettings", "UpdateResult", "lost"]
 
 Array = NDArray[np.float64]
-STEP_M = 0.1  # the reference follows the view in steps, so that a trembling camera adds no travel
-
-
-@dataclass(frozen=True)
-class UpdateResult:
-    """What became of one observation: whether its surface was used, the parts used ('surface', 'leading', 'trailing'),
-    the normalised innovation squared of those parts with its degrees of freedom, and why anything was refused.
-    part_nis: of each part, an edge's given the surface; refused_m: how far outward of the tracked edge a refused one
-    lies."""
-
-    accepted: bool
-    parts: tuple[str, ...] = ()
-    nis: float = float("nan")
-    dof: int = 0
-    reasons: tuple[str, ...] = ()
-    part_nis: Mapping[str, float] = field(default_factory=dict)
-    refused_m: Mapping[Side, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -69,6 +47,7 @@ class BladeTracker:
         self.frame = frame
         self.camera = camera
         self.settings = settings or TrackerSettings()
+        self._gate = BladeGate(camera, frame, self.settings)
         self.forget()
 
     def forget(self) -> None:
@@ -76,7 +55,10 @@ class BladeTracker:
         self._model: BladeModel | None = None
         self._challenger: BladeModel | None = None
         self._challenges = 0
+        self._challenged_s = -np.inf
+        self._tremble = Tremble(self.settings.claimed_jitter_m, self.settings.claimed_attitude)
         self._stamp_s = -np.inf
+        self._late_s: list[float] = []
         self._taken_s: deque[float] = deque(maxlen=32)
         self._seen_s: dict[str, float] = {}
         self._challenger_seen_s: dict[str, float] = {}
@@ -109,7 +91,7 @@ class BladeTracker:
         """
         if self._model is None:
             return None
-        model = self._until(self._model, stamp_s)
+        model = self._until(self._model, stamp_s).seen_from(self.frame.to_blade(pose.position))
         station, offset, _ = look_at(pose, self.frame, model)
         return model.moved(station, offset, self.settings)
 
@@ -119,7 +101,7 @@ class BladeTracker:
         if model is None:
             return None
         ages = {part: max(stamp_s - seen_s, 0.0) for part, seen_s in self._seen_s.items()}
-        return view(model, self.frame, pose, self.camera, stamp_s, ages)
+        return view(model, self.frame, pose, self.camera, stamp_s, ages, self.settings.surface_sigma_m)
 
     def update(self, observation: BladeObservation, pose: CameraPose) -> UpdateResult:
         """Use an observation taken from `pose` at its own stamp (6.3 to 6.7), also when a later one came first.
@@ -130,45 +112,64 @@ class BladeTracker:
         stamp_s = observation.stamp_s
         if not observation.valid or observation.distance_m is None:
             return UpdateResult(False, reasons=observation.reasons or ("vision gave no reason",))
+        if not _finite(observation, pose):
+            return UpdateResult(False, reasons=("the observation or its pose holds what is no number",))
+        observation = replace(observation, edges=tuple(edge for edge in observation.edges if _definite(edge)))
         if stamp_s in self._taken_s:
             return UpdateResult(False, reasons=("the observation was already used",))
         if stamp_s < self._stamp_s - self.settings.history_s:
-            return UpdateResult(False, reasons=(f"the observation is {self._stamp_s - stamp_s:.1f} s late",))
+            return self._late(stamp_s)
+        self._late_s = []
         self._taken_s.append(stamp_s)
         if self._model is None:
             return self._challenge(observation, pose, ("the blade is not confirmed yet",))
+        seconds = stamp_s - self._stamp_s
         model = self._until(self._model, stamp_s)
-        result, corrected = self._correct(model, observation, pose)
-        if corrected is None:
-            self._stamp_s = max(self._stamp_s, stamp_s)
+        judged = self._gate.correct(model, observation, pose, self._tremble, max(-seconds, 0.0))
+        self._stamp_s = max(self._stamp_s, stamp_s)
+        if judged.after is None or judged.used is None:
             self._model = model
-            return self._challenge(observation, pose, result.reasons)
-        self._model, self._stamp_s = self._edges_settled(corrected, result), max(self._stamp_s, stamp_s)
+            return self._challenge(observation, pose, judged.result.reasons)
+        self._tremble = self._tremble.learnt(judged.before, judged.used, seconds, self.settings)
+        self._model = self._edges_settled(judged.after, judged.result)
         self._challenger, self._challenges = None, 0
-        for part in result.parts:
+        for part in judged.result.parts:
             self._seen_s[part] = max(stamp_s, self._seen_s.get(part, -np.inf))
-        return result
+        return judged.result
 
     def _until(self, model: BladeModel, stamp_s: float) -> BladeModel:
         seconds = stamp_s - self._stamp_s
-        return model.drifted(seconds, self.settings) if 0 < seconds < np.inf else model
+        return model.later(seconds, self._tremble.jitter_m, self.settings) if 0 < seconds < np.inf else model
+
+    def _late(self, stamp_s: float) -> UpdateResult:
+        """Of a row of late observations, each later than the one before, the clock must have been set back."""
+        behind_s = self._stamp_s - stamp_s
+        self._late_s = [late_s for late_s in self._late_s if late_s < stamp_s] + [stamp_s]
+        if len(self._late_s) < self.settings.restart_after:
+            return UpdateResult(False, reasons=(f"the observation is {behind_s:.1f} s late",))
+        self.forget()
+        return UpdateResult(False, reasons=(f"time has gone back by {behind_s:.1f} s: the blade is forgotten",))
 
     def _challenge(self, observation: BladeObservation, pose: CameraPose, reasons: tuple[str, ...]) -> UpdateResult:
         """A refused observation stands against what is tracked: the covariance grows, and a row of agreeing ones
         wins."""
         settings = self.settings
-        there = self.frame.to_blade(pose.to_ned(np.array([observation.distance_m or 0.0, 0.0, 0.0])))
-        result, corrected = UpdateResult(False), None
+        judged, tremble = None, self._tremble
         if self._challenger is not None:
-            result, corrected = self._correct(self._challenger.drifted(0.1, settings), observation, pose)
-        if corrected is None:
+            seconds = max(observation.stamp_s - self._challenged_s, 0.0)
+            later = self._challenger.later(seconds, tremble.jitter_m, settings)
+            judged = self._gate.correct(later, observation, pose, tremble)
+        if judged is None or judged.after is None:
             self._challenges = 0
             self._challenger_seen_s = {}
-            result, corrected = self._correct(prior(there[0], there[1], settings), observation, pose)
-            if corrected is None:
+            there, lens = self._gate.meets(observation, pose), self.frame.to_blade(pose.position)
+            fresh = prior(there[0], there[1], lens, tremble.jitter_m, settings)
+            judged = self._gate.correct(fresh, observation, pose, tremble)
+            if judged.after is None:
                 self._challenger = None
                 return UpdateResult(False, reasons=(*reasons, "nor is it where the survey allows a blade"))
-        self._challenger = corrected
+        result, corrected = judged.result, judged.after
+        self._challenger, self._challenged_s = corrected, observation.stamp_s
         self._challenges += 1
         self._challenger_seen_s |= dict.fromkeys(result.parts, observation.stamp_s)
         needed = settings.confirmations if self._model is None else settings.restart_after
@@ -197,68 +198,6 @@ class BladeTracker:
         sigmas = np.array([settings.inflation_m, *[settings.inflation_slope] * (count - 1)])
         return model.inflated(values, sigmas)
 
-    def _correct(
-        self, model: BladeModel, observation: BladeObservation, pose: CameraPose
-    ) -> tuple[UpdateResult, BladeModel | None]:
-        """The model after this observation, or None where its surface does not pass the gate."""
-        settings = self.settings
-        there = self.frame.to_blade(pose.to_ned(np.array([observation.distance_m or 0.0, 0.0, 0.0])))
-        if np.hypot(there[0] - model.station, there[1] - model.offset) > STEP_M:
-            model = model.moved(there[0], there[1], settings)
-        surface = measure(observation, {}, pose, self.camera, self.frame, model, settings)
-        nis, dof = innovation(model, surface, ["surface"])
-        if not nis < chi2.ppf(settings.gate, dof):
-            deeper = float(surface.z[0] - surface.H[0] @ model.mean)
-            where = "behind" if deeper > 0 else "before"
-            text = f"the surface lies {abs(deeper):.2f} m {where} the tracked one or leans otherwise"
-            return UpdateResult(False, nis=nis, dof=dof, reasons=(text,), part_nis={"surface": nis}), None
-        # Where the surface was uncertain, edges are linearised around what it has just become.
-        around = replace(model, mean=model.corrected(surface.z, surface.R, surface.H).mean)
-        edges, reasons = self._sides(observation, pose, around)
-        joint = measure(observation, edges, pose, self.camera, self.frame, around, settings)
-        if len(edges) == 2 and not width(joint, around) > 0:
-            edges, joint = {}, surface
-            reasons.append("the edges lie the wrong way round")
-        part_nis = {"surface": nis}
-        off: dict[Side, float] = {}
-        for side in edges:
-            part_nis[side] = innovation(model, joint, ["surface", side])[0] - nis
-            if not part_nis[side] < chi2.ppf(settings.gate, 2):
-                row = joint.parts[side].start
-                off[side] = float(joint.z[row] - joint.H[row] @ model.mean)
-                reasons.append(f"the {side} edge is seen {abs(off[side]):.2f} m from where it is tracked")
-        accepted = [side for side in edges if side not in off]
-        parts = ["surface", *accepted]
-        rows = np.concatenate([np.r_[joint.parts[part]] for part in parts])
-        nis, dof = innovation(model, joint, parts)
-        corrected = model.corrected(joint.z[rows], joint.R[np.ix_(rows, rows)], joint.H[rows])
-        return UpdateResult(True, tuple(parts), nis, dof, tuple(reasons), part_nis, off), corrected
-
-    def _sides(
-        self, observation: BladeObservation, pose: CameraPose, model: BladeModel
-    ) -> tuple[dict[Side, Edge], list[str]]:
-        """Edges by the side that their outward normals tell; of two on one side, the one nearer to what is tracked."""
-        edges: dict[Side, Edge] = {}
-        reasons: list[str] = []
-        for edge in observation.edges:
-            side = side_of(edge, self.camera, pose, self.frame, model)
-            if side is None:
-                reasons.append("an edge runs across the blade")
-                continue
-            if side in edges:
-                reasons.append(f"two edges claim the {side} side")
-                off = [
-                    abs(float(m.z[-2] - m.H[-2] @ model.mean))
-                    for m in (
-                        measure(observation, {side: e}, pose, self.camera, self.frame, model, self.settings)
-                        for e in (edges[side], edge)
-                    )
-                ]
-                if off[0] <= off[1]:
-                    continue
-            edges[side] = edge
-        return edges, reasons
-
     def _edges_settled(self, model: BladeModel, result: UpdateResult) -> BladeModel:
         """Count refused edges: a row of them makes the edge less certain, a long agreeing row makes it forgotten."""
         settings = self.settings
@@ -279,19 +218,15 @@ class BladeTracker:
         return model
 
 
-def innovation(model: BladeModel, measurement: Measurement, parts: list[str]) -> tuple[float, int]:
-    """Normalised innovation squared of some parts of a measurement, and its degrees of freedom."""
-    rows = np.concatenate([np.r_[measurement.parts[part]] for part in parts])
-    H = measurement.H[rows]
-    innovation = measurement.z[rows] - H @ model.mean
-    S = H @ model.covariance @ H.T + measurement.R[np.ix_(rows, rows)]
-    return float(innovation @ np.linalg.solve(S, innovation)), len(rows)
+def _finite(observation: BladeObservation, pose: CameraPose) -> bool:
+    numbers = [np.array([observation.stamp_s, observation.distance_m], float), pose.position, pose.rotation]
+    numbers += [each for each in (observation.normal, observation.plane_covariance) if each is not None]
+    return all(np.isfinite(each).all() for each in numbers)
 
 
-def width(measurement: Measurement, model: BladeModel) -> float:
-    """From the measured trailing edge to the measured leading one, in metres along `across`."""
-    offset = measurement.z - measurement.H[:, PLANE] @ model.mean[PLANE]
-    return float(offset[measurement.parts["leading"].start] - offset[measurement.parts["trailing"].start])
+def _definite(edge: Edge) -> bool:
+    numbers = [edge.line.theta, edge.line.rho, edge.sigma_theta, edge.sigma_rho_px]
+    return all(np.isfinite(each).all() for each in (np.array(numbers), edge.outward, edge.ends))
 
 
 def lost(estimate: BladeEstimate | None, max_age_s: float, max_sigma_m: float) -> str | None:
