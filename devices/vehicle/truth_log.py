@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,7 +21,7 @@ _PERIOD_S = 0.05
 
 class TruthLog:
     """Appends to both files at 20 Hz of simulated time and flushes each row, so that a killed process leaves all it
-    knew.
+    knew. A disk that is full later on loses rows, and never the vehicle.
 
     `wall`: write wall time too (`wall_s`, of time.monotonic, the same clock in every process of a machine); without it
     the column is empty and two runs alike give files alike. Call `update` after every step.
@@ -55,23 +56,26 @@ class TruthLog:
         line: dict[str, Any] = {"t": round(event.time_s, 3), "kind": event.kind, **event.data, **details}
         if self._wall:
             line["wall_s"] = round(time.monotonic(), 4)
-        self._events.write(json.dumps(line) + "\n")
-        self._events.flush()
+        with suppress(OSError):
+            self._events.write(json.dumps(line) + "\n")
+            self._events.flush()
 
     def close(self) -> None:
         """Close both files; idempotent."""
-        self._rows.close()
-        self._events.close()
+        for file in (self._rows, self._events):
+            with suppress(OSError):
+                file.close()
 
     def _row(self) -> None:
         vehicle, body, estimate = self._vehicle, self._vehicle.body, self._vehicle.estimate
         numbers = (body.n, body.e, body.d, body.roll, body.pitch, body.yaw, vehicle.gimbal.yaw, vehicle.gimbal.pitch)
         more = (body.vn, body.ve, body.vd, estimate.n, estimate.e, estimate.d, *vehicle.wind.velocity[:2])
-        self._rows.write(
-            f"{vehicle.time_s:.3f},"
-            + ",".join(f"{number:.4f}" for number in numbers)
-            + f",{vehicle.firmware.mode.name},{int(vehicle.firmware.armed)},"
-            + ",".join(f"{number:.3f}" for number in more)
-            + f",{vehicle.battery.percent:.2f},{f'{time.monotonic():.4f}' if self._wall else ''}\n"
-        )
-        self._rows.flush()
+        with suppress(OSError):
+            self._rows.write(
+                f"{vehicle.time_s:.3f},"
+                + ",".join(f"{number:.4f}" for number in numbers)
+                + f",{vehicle.firmware.mode.name},{int(vehicle.firmware.armed)},"
+                + ",".join(f"{number:.3f}" for number in more)
+                + f",{vehicle.battery.percent:.2f},{f'{time.monotonic():.4f}' if self._wall else ''}\n"
+            )
+            self._rows.flush()
