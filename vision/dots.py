@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.motion import halved, motion_between, shifted
+from vision.motion import halved, motion_between
 from vision.peaks import Peaks, gained, standing_out
 from vision.spot_fit import first_of_each, fit_spots
 from vision.spot_light import lights, weighed
@@ -26,7 +25,8 @@ REACHES = (4, 8)  # px, least and largest half square in which a spot is measure
 REGISTRATION_PX = 0.12  # how far laser-off and laser-on images may lie apart after their motion is made up for
 LEAST_VARIANCE = 0.1  # grey levels², of rounding
 SIGNIFICANT = 3.0  # standard deviations of a spot's level
-WORST_PX = 0.8  # a standard deviation from which a place is none
+LONE = 1.5  # times as uncertain is a spot's place where what lies under it is guessed from around it
+WORST_PX = 0.5  # a standard deviation from which a place is none
 APART_PX = 4.0  # nearer to a stronger one a spot is part of it
 
 
@@ -123,6 +123,8 @@ def _measured(on: Image, off: Image | None, peaks: Peaks, motion: Array, shape: 
     # the fit's own residuals say how much of the claimed noise is true, as far as so few can
     weight = light.signal.shape[1] / 3
     scale = np.sqrt((20 + weight * quality[:, 3]) / (20 + weight))
+    if off is None:
+        scale *= LONE
     sigma = np.sqrt(0.5 * (quality[:, 0] + quality[:, 1])) * scale
     keep = (found[:, 2] > SIGNIFICANT * np.sqrt(quality[:, 2]) * scale) & (sigma < WORST_PX)
     keep &= (np.abs(found[:, :2]) < reach - 0.6).all(axis=1)
@@ -140,15 +142,3 @@ def _shape(on: Image, off: Image | None, peaks: Peaks, motion: Array, shape: Arr
     uu, uv, vv = np.median(shapes / determinant[:, None], axis=0)  # of the inverses: (vv, -uv, uu)
     result: Array = np.array([uu, uv, vv]) / (uu * vv - uv * uv)
     return result
-
-
-def without_spots(on: Image, off: Image, spots: Spots, reach: int = 5) -> Image:
-    """The laser-on image (h, w) or (h, w, c) with every spot painted over from the laser-off image, moved as
-    `spots.motion` says."""
-    height, width = on.shape[:2]
-    mask = np.zeros((height, width), np.uint8)
-    at = np.rint(spots.uv).astype(int)
-    mask[at[:, 1].clip(0, height - 1), at[:, 0].clip(0, width - 1)] = 255
-    around = cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-    still = shifted(off, spots.motion).reshape(on.shape) if spots.motion.any() else off
-    return np.asarray(cv2.copyTo(still, around, on.copy()), np.uint8).reshape(on.shape)

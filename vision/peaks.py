@@ -19,6 +19,7 @@ RING = 4  # px of the half-size image, where a dot of a single laser-on image mu
 SIGNIFICANT = 4.0  # standard deviations, from which a gain of light is no noise
 LEAST_NOISE = 0.1  # grey levels, of a 3 × 3 mean of the half-size image
 APART_STILL, APART_MOVED = 0.04, 0.1  # px by which two half-size images may lie apart, as a standard deviation
+SOFTENED = 0.3  # of a pixel's noise, what is left in a Gaussian mean over 5 × 5
 MOST = 180  # peaks kept, the strongest; the grid has 121 dots
 
 
@@ -42,7 +43,7 @@ def standing_out(on: Image, reachable: Image) -> Peaks:
     height[:RING], height[-RING:], height[:, :RING], height[:, -RING:] = 0, 0, 0, 0
     rough = light[::3, 2:] - 2 * light[::3, 1:-1] + light[::3, :-2]
     noise = 1.4826 * float(np.median(np.abs(rough))) / np.sqrt(6)
-    return _strongest(height, np.zeros_like(height), max(noise, 4 * LEAST_NOISE), 0.0, reachable)
+    return _strongest(height, np.zeros_like(height), max(SOFTENED * noise, LEAST_NOISE), 0.0, reachable)
 
 
 def _strongest(gain: Array, step: Array, noise: float, apart: float, reachable: Image) -> Peaks:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,15 +12,17 @@ from vision.camera import RigGeometry
 from vision.candidates import Candidate
 from vision.capture import Image, StereoFrames
 from vision.chord import chord, heading
-from vision.dots import Spots, find_spots, without_spots
+from vision.dots import Spots, find_spots
 from vision.edges import edge_of, find_edges
 from vision.evidence import Blade, OtherEye, texture_between
-from vision.grid import Matches, expected_points, grid_coordinates, match_eyes, match_laser, reachable
+from vision.explained import absent_dots, explained_dots
+from vision.grid import Matches, match_eyes, match_laser, reachable
 from vision.lines import smoothed
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import green, reduce_image, reduction_factor, to_full, tones
 from vision.single import observe_photograph
+from vision.spot_paint import without_spots
 from vision.stopwatch import Now, Stopwatch
 from vision.surface import Surface, fit_surface
 from vision.tip import tip_of
@@ -34,8 +37,8 @@ SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as 
 class Eye:
     """Observes blades with one rig. Holds no state between frames and may be shared by threads.
 
-    Dots, points and edges all belong to the instant of the laser-on images; the laser-off images only tell the dots
-    apart. now: the clock that `elapsed_ms` of an observation is told by; without one it is empty.
+    Dots, points and edges all belong to the instant of the laser-on images; the laser-off images, where there are any,
+    only tell the dots apart. now: the clock that `elapsed_ms` of an observation is told by; without one it is empty.
     """
 
     def __init__(self, geometry: RigGeometry, now: Now | None = None) -> None:
@@ -57,9 +60,8 @@ class Eye:
         expected: direction of the blade's axis in the left image, rad modulo π, where tracker or survey know it.
         """
         watch = Stopwatch(self._now)
-        missing = [name for name in ("left", "left_laser") if getattr(frames, name) is None]
-        if missing:
-            return self._refused(frames, watch, f"no {' and no '.join(missing)} image")
+        if frames.left_laser is None:
+            return self._refused(frames, watch, "no left_laser image")
         images: dict[str, Image] = {}
         for name in ("left", "left_laser", "right", "right_laser"):
             image: Image | None = getattr(frames, name)
@@ -67,11 +69,10 @@ class Eye:
                 self._check_size(name, image)
                 images[name] = reduce_image(image, self.factor)
         watch.lap("reduce")
-        both = "right" in images and "right_laser" in images
-        left = find_spots(green(images["left"]), green(images["left_laser"]), self._reachable[0])
-        right = (
-            find_spots(green(images["right"]), green(images["right_laser"]), self._reachable[1], left) if both else None
-        )
+        left = find_spots(_green_of(images, "left"), green(images["left_laser"]), self._reachable[0])
+        right = None
+        if "right_laser" in images:
+            right = find_spots(_green_of(images, "right"), green(images["right_laser"]), self._reachable[1], left)
         watch.lap("dots")
         laser = self.geometry.laser
         if laser is None:
@@ -115,14 +116,16 @@ class Eye:
         watch: Stopwatch,
         expected: float | None,
     ) -> BladeObservation:
-        factor, camera = self.factor, self._stereo.left
-        clean = without_spots(tones(images["left_laser"]), tones(images["left"]), left)
+        factor, camera, laser = self.factor, self._stereo.left, self.geometry.laser
+        assert laser is not None
+        still = tones(images["left"]) if "left" in images else None
+        clean = without_spots(tones(images["left_laser"]), still, left)
         smooth = smoothed(clean)
         seeds = left.uv[blade.left]
         dots = seeds - camera.centre
         around = Blade(
             dots,
-            self._absent(left, right, matches, blade, surface),
+            absent_dots(left, right, matches, blade, surface, laser, self._stereo),
             texture_between(smooth, seeds),
             slope=surface.slope,
             focal=camera.fx,
@@ -141,9 +144,9 @@ class Eye:
         if direction is None and np.isfinite(axis):
             direction = axis
         sharp = sharpness(clean, edges)
-        bright = exposure(images["left"], seeds)
+        bright = exposure(images.get("left", clean), seeds)
         order = _left_first(edges, axis)
-        dots_left = self._dots(left, rays, matches, surface)
+        dots_left = explained_dots(left, rays, matches, surface, laser, factor)
         dots_right = None
         if right is not None:
             known = matches.right >= 0
@@ -177,53 +180,6 @@ class Eye:
             elapsed_ms=watch.elapsed_ms,
         )
 
-    def _dots(self, left: Spots, rays: Array, matches: Matches, surface: Surface) -> Dots:
-        """Every dot of the left image with its index: the matched ones, and those that the surface explains."""
-        laser = self.geometry.laser
-        assert laser is not None
-        uv, row, column = left.uv[matches.left], matches.row, matches.column
-        rest = np.setdiff1d(np.arange(len(left)), matches.left)
-        if len(matches):
-            rest = rest[left.level[rest] > 0.4 * float(np.median(left.level[matches.left]))]
-        inverse = surface.inverse_depth(rays[rest])
-        rest, inverse = rest[inverse > 0.03], inverse[inverse > 0.03]
-        if len(rest):
-            place = grid_coordinates(rays[rest] / inverse[:, None], laser)
-            whole = np.rint(place)
-            taken = set(zip(row.tolist(), column.tolist(), strict=True))
-            fits = (np.abs(place - whole).max(axis=1) < 0.08) & (whole >= 0).all(axis=1)
-            fits &= (whole < (laser.rows, laser.columns)).all(axis=1)
-            for index, (r, c) in zip(rest[fits], whole[fits].astype(int).tolist(), strict=True):
-                if (r, c) not in taken:
-                    taken.add((r, c))
-                    uv, row, column = np.vstack([uv, left.uv[index]]), np.append(row, r), np.append(column, c)
-        return Dots(to_full(uv, self.factor), row, column)
-
-    def _absent(self, left: Spots, right: Spots | None, matches: Matches, blade: Matches, surface: Surface) -> Array:
-        """Where dots would lie in the left image (image frame, working px) if the blade went on, but are none; a spot
-        that nothing explains there leaves it open."""
-        laser, stereo = self.geometry.laser, self._stereo
-        assert laser is not None
-        points = expected_points(laser, surface.depth_m, surface.slope)
-        free = np.isfinite(points[:, 0])
-        free[blade.row * laser.columns + blade.column] = False
-        points = points[free]
-        inside = np.ones(len(points), bool)
-        pixels = []
-        for camera, spots, known, there in (
-            (stereo.left, left, matches.left, points),
-            (stereo.right, right, matches.right, points @ stereo.rotation.T + stereo.translation),
-        ):
-            uv = camera.project(there)
-            pixels.append(uv)
-            if spots is None:
-                continue
-            inside &= (uv > 6).all(axis=1) & (uv < (camera.width - 7, camera.height - 7)).all(axis=1)
-            unread = np.delete(spots.uv, known, axis=0)
-            if len(unread):
-                inside &= np.hypot(*(uv[:, None] - unread).transpose(2, 0, 1)).min(axis=1) > 6
-        return np.asarray(pixels[0][inside] - stereo.left.centre, float)
-
     def _check_size(self, name: str, image: Image) -> None:
         camera = self.geometry.stereo.right if name.startswith("right") else self.geometry.stereo.left
         if image.shape[:2] != (camera.height, camera.width):
@@ -249,6 +205,10 @@ def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now |
                 f"the rig's camera {camera.width} × {camera.height}"
             )
     return observe_photograph(image, now=now)
+
+
+def _green_of(images: Mapping[str, Image], name: str) -> Image | None:
+    return green(images[name]) if name in images else None
 
 
 def _blade_of(matches: Matches) -> Matches:

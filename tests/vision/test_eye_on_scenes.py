@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from devices.scenes import Scene, SceneSettings, draw_scene
+from devices.scenes.settings import Behind
+from vision.dots import find_spots
 from vision.observation import BladeObservation, Dots
 from vision.pipeline import Eye
+from vision.reduction import green
 
 ANGLES_DEG = [0, 23, 45, 67, 90, 113, 135, 158, 180, 225, 270, 315]
 PLAIN = SceneSettings(
@@ -179,10 +182,67 @@ def test_without_laser_light_it_refuses_and_says_what_it_saw() -> None:
 def test_a_missing_image_is_a_refusal_and_a_wrong_size_an_error() -> None:
     scene = draw_scene(PLAIN)
     eye = Eye(scene.geometry)
-    assert not eye.observe(replace(scene.frames, left=None)).valid
+    assert not eye.observe(replace(scene.frames, left_laser=None)).valid
     assert scene.frames.right is not None
     with pytest.raises(ValueError, match="612 × 512"):
         eye.observe(replace(scene.frames, right=scene.frames.right[:100]))
+
+
+@pytest.mark.parametrize("colour", [True, False])
+@pytest.mark.parametrize("background", ["horizon", "clutter"])
+def test_two_laser_on_images_alone_give_dots_matches_and_distance(colour: bool, background: Behind) -> None:
+    scene = draw_scene(replace(PLAIN, angle=1.1, colour=colour, background=background, baseline_m=0.15))
+    observation = Eye(scene.geometry).observe(replace(scene.frames, left=None, right=None))
+    assert observation.valid and observation.distance_m == pytest.approx(scene.truth.distance_m, rel=0.01)
+    for found, side in ((observation.dots_left, "left"), (observation.dots_right, "right")):
+        assert found is not None
+        right, wrong, rms = index_errors(found, scene.truth.dots(side))
+        assert right >= 0.9 * len(scene.truth.dots(side)) and wrong == 0 and rms < 0.25
+    assert_edges(scene, observation)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        replace(PLAIN, brightness=232.0, dot_level=160.0, shade=0.0),
+        replace(PLAIN, dot_streak=2.0, motion_blur_px=4.0, dot_level=150.0),
+        replace(PLAIN, brightness=90.0, noise=3.5),
+    ],
+    ids=["burnt out", "streaked and blurred", "noisy"],
+)
+def test_dots_are_centred_to_a_tenth_of_a_pixel_and_say_how_well(settings: SceneSettings) -> None:
+    scene = draw_scene(settings)
+    frames, eye = scene.frames, Eye(scene.geometry)
+    assert frames.left is not None and frames.left_laser is not None
+    spots = find_spots(green(frames.left), green(frames.left_laser))
+    true = scene.truth.dots("left").uv
+    nearest = np.hypot(*(true[:, None] - spots.uv[None]).transpose(2, 0, 1)).argmin(axis=1)
+    errors = spots.uv[nearest] - true
+    assert np.sqrt(np.mean(errors**2)) < 0.12
+    assert 0.6 < np.sqrt(np.mean((errors / spots.sigma_px[nearest, None]) ** 2)) < 1.5
+    assert eye.observe(frames).valid
+
+
+@pytest.mark.parametrize("baseline_m", [0.05, 0.12, 0.20, 0.30])
+def test_every_match_is_right_at_every_baseline(baseline_m: float) -> None:
+    for seed in range(6):
+        settings = replace(PLAIN, seed=70 + seed, baseline_m=baseline_m, distance_m=1.6 + 0.8 * seed, angle=0.9 * seed)
+        scene, observation = seen(replace(settings, background="tower", motion_px=(9.0 * seed - 20, 12.0)))
+        assert observation.dots_right is not None
+        right, wrong, _ = index_errors(observation.dots_right, scene.truth.dots("right"))
+        assert wrong == 0 and right > 8
+
+
+def test_points_cover_the_truth_at_their_claimed_sigma() -> None:
+    errors = []
+    for seed in range(6):
+        scene, observation = seen(replace(PLAIN, seed=500 + seed, angle=1.0 * seed, baseline_m=0.05 + 0.05 * seed))
+        assert observation.dots_left is not None and observation.points is not None
+        assert observation.sigma_m is not None
+        near = np.abs(observation.points[:, None] - scene.truth.points[None])
+        truth = scene.truth.points[np.nanargmin(near[..., 1] + near[..., 2], axis=1)]
+        errors += ((observation.points[:, 0] - truth[:, 0]) / observation.sigma_m).tolist()
+    assert 0.7 < np.sqrt(np.mean(np.square(errors))) < 1.4
 
 
 def test_one_eye_and_the_laser_still_give_a_distance() -> None:
