@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate
 from vision.capture import Image
-from vision.ending_kernels import likeliest
+from vision.ending_kernels import likeliest, outline_through, summits_over
 from vision.evidence import Blade
 from vision.lines import visible_stretch
 from vision.profile_kernels import seen_in_lanes, steps_in_lanes
@@ -19,6 +19,7 @@ from vision.profile_kernels import seen_in_lanes, steps_in_lanes
 Array = NDArray[Any]  # of floats
 
 LANES = 25  # across the blade, from edge to edge
+FIRST_SHARE = 0.05  # of the width, from the edge to the first lane
 STEP = 1.5  # px along a lane
 SLACK = 4  # samples by which an outline may miss the steps before it is fitted to them
 BOX, LONG_BOX = 4, 14  # samples averaged on either side of a step, and on either side to tell it from a streak
@@ -32,6 +33,7 @@ NARROWEST = 16.0  # px
 HIDDEN_PX = 9.0  # a step so far before the outline hides it
 SUMMITS = (0.0, -0.1, 0.1, -0.3, 0.3, -0.6, 0.6)  # of an outline, from the middle toward an edge
 LOPSIDED = -8.0  # evidence of an outline whose summit is all the way to one side
+LEAST_LANES, UNREFINED_PX = 6, 4.0  # that an outline is fitted to, and its standard deviation with fewer
 BORDER = 6.0  # px: an outline nearer to the image border than this is not seen to close
 
 
@@ -48,19 +50,11 @@ def _shapes() -> tuple[Array, Array]:
 
 def lane_shares() -> Array:
     """Where the lanes lie between the edges (LANES,), 0 on the one and 1 on the other."""
-    return np.linspace(0.05, 0.95, LANES)
+    return np.linspace(FIRST_SHARE, 1 - FIRST_SHARE, LANES)
 
 
 LENGTHS, DEPTHS = _shapes()
 PRIORS = LOPSIDED * np.abs(2 * lane_shares()[DEPTHS.argmin(axis=1)] - 1) * (LENGTHS > 0)
-
-
-def _depths(shares: Array) -> Array:
-    """Depths (k, n) of the shapes at shares (n,) of the way from edge to edge, in lengths."""
-    place = np.clip((shares - 0.05) / 0.9 * (LANES - 1), 0, LANES - 1)
-    lane = np.minimum(place.astype(np.int64), LANES - 2)
-    part = place - lane
-    return np.asarray(DEPTHS[:, lane] * (1 - part) + DEPTHS[:, lane + 1] * part)
 
 
 @dataclass(frozen=True)
@@ -184,12 +178,13 @@ def _best(
     reach = LENGTHS * wide
     # Dots that the outline has to hold, and missing ones that it should not.
     strays = int(blade.strays * len(along) + 0.9) if len(along) >= 20 else 0
-    needed = np.sort(along + reach[:, None] * _depths(share_of), axis=1)[:, len(along) - 1 - strays] - DOT_ROOM
+    over = _summits_over(along, share_of, reach)
+    needed = np.partition(over, len(along) - 1 - strays, axis=1)[:, len(along) - 1 - strays] - DOT_ROOM
     gone, aside = blade.absent @ toward, blade.absent @ across
     share_gone = (aside - low.at(gone)) / np.maximum(high.at(gone) - low.at(gone), 1.0)
     between = (share_gone > 0.08) & (share_gone < 0.92)
     gone, share_gone = (gone - skew * (share_gone - 0.5) * wide)[between], share_gone[between]
-    holes = np.sort(gone + reach[:, None] * _depths(share_gone), axis=1) + DOT_ROOM
+    holes = _summits_over(gone, share_gone, reach) + DOT_ROOM
     hole = HOLE if blade.grid_known else HOLE / 2
     shift = np.rint(DEPTHS * reach[:, None] / STEP).astype(np.int64)
     lead = int(shift.max()) + 1
@@ -214,7 +209,10 @@ def _best(
     goes_on = float((low.until(end) + high.until(end))[0]) + hole * len(gone)
     at = top - shift[k]
     lanes_seen = (at >= 0) & (seen[np.arange(LANES), np.maximum(at, 0)] > 0.4)
-    station, scatter = _refined(s, size, at, lanes_seen, DEPTHS[k], float(reach[k]), float(s[top]))
+    station, scatter = float(s[top]), UNREFINED_PX
+    if lanes_seen.sum() >= LEAST_LANES:
+        farther, sigma = outline_through(size, at, top, lanes_seen, DEPTHS[k], float(reach[k]), STEP)
+        station, scatter = station + farther, float(np.hypot(0.5, sigma))
     lane_share = float(shares[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
     lane = float(low.at(station) + lane_share * (high.at(station) - low.at(station)))
     outermost = station + skew * (lane_share - 0.5) * wide
@@ -222,32 +220,8 @@ def _best(
     return Ending(toward, outermost, lane, float(s[top] - reach[k]), share_top, scatter, step, evidence, goes_on)
 
 
-def _refined(
-    s: Array, size: Array, at: NDArray[np.int64], seen: NDArray[np.bool_], shape: Array, reach: float, station: float
-) -> tuple[float, float]:
-    """The outermost point's station, from the steepest places near the outline, and its standard deviation."""
-    near = np.clip(at[:, None] + np.arange(-4, 5), 0, size.shape[1] - 1)
-    values = np.take_along_axis(size, near, 1)
-    top = np.clip(values.argmax(axis=1), 1, 7)
-    rows = np.arange(len(at))
-    before, peak, after = values[rows, top - 1], values[rows, top], values[rows, top + 1]
-    bend = before - 2 * peak + after
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shift = np.where(bend < 0, np.clip(0.5 * (before - after) / bend, -0.5, 0.5), 0.0)
-    place = s[near[rows, top]] + STEP * (shift - 0.5)
-    if seen.sum() < 6:
-        return station, 4.0
-    residual = (place - station + reach * shape)[seen]
-    # Outermost point and length of the outline together; the length is held to the shape's own.
-    terms = np.column_stack([np.ones(len(residual)), -shape[seen]])
-    fit = np.array([float(np.median(residual)), 0.0])
-    scatter = 1.0
-    held = np.diag([1e-6, 1.0 / max(0.1 * reach, 0.1) ** 2])
-    for _ in range(4):
-        off = residual - terms @ fit
-        scatter = max(0.7, 1.4826 * float(np.median(np.abs(off))))
-        weight = 1 / (1 + (off / (2 * scatter)) ** 2) ** 2 / scatter**2
-        information = (terms * weight[:, None]).T @ terms + held
-        fit = np.linalg.solve(information, (terms * weight[:, None]).T @ residual)
-    sigma = float(np.sqrt(3 * np.linalg.inv(information)[0, 0]))
-    return station + float(fit[0]), float(np.hypot(0.5, sigma))
+def _summits_over(along: Array, shares: Array, reach: Array) -> Array:
+    """Where the outermost point of each shape (k, n) has to be for it to pass through n points."""
+    summits = np.empty((len(reach), len(along)))
+    summits_over(along, shares, DEPTHS, FIRST_SHARE, reach, summits)
+    return summits

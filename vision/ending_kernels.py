@@ -1,4 +1,4 @@
-"""Inner loop of a blade's end: which of the shapes, and how far out, explains steps, edges and dots best."""
+"""Inner loops of a blade's end: which of the shapes, and how far out, explains steps, edges and dots best."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 from vision.compiled import compiled
 
 Floats = NDArray[Any]
+
+AROUND = 4  # places about an outline in which its steepest place is sought
+LEAST_SCATTER_PX = 0.7  # of the steepest places about their outline
+LENGTH_HELD = 0.1  # of an outline's reach: what it may be off
 
 
 @compiled
@@ -31,17 +35,24 @@ def likeliest(
 
     seen (lanes, m): how much of a step there is at each place. Of k shapes: shift (k, lanes) and reach (k,) in places
     below the outermost one, base (k,) evidence beforehand, weight (k,) of the lanes, first (k,) least place, holes
-    (k, h) places, ascending, beyond which each missing dot is inside. until (m + lead,): evidence of edges that go on
+    (k, h) places beyond which each missing dot is inside. until (m + lead,): evidence of edges that go on
     to a place and no further, `lead` places ahead of seen's first. last: greatest place.
     """
     lanes, count = seen.shape
     lead = len(until) - count
     best, best_shape, best_place, best_share = -np.inf, -1, -1, 0.0
+    uncovered = np.zeros(count + 1, np.int64)  # holes that lie inside from each place on
     for k in range(len(reach)):
+        uncovered[:] = 0
+        for h in range(holes.shape[1]):
+            uncovered[int(min(max(np.floor(holes[k, h]) + 1, 0), count))] += 1
         inside = 0
-        for place in range(max(first[k], 0), min(last + 1, count)):
-            while inside < holes.shape[1] and holes[k, inside] < place:
-                inside += 1
+        for place in range(count):
+            inside += uncovered[place]
+            if place > last:
+                break
+            if place < first[k]:
+                continue
             at_shoulder = min(max(place - reach[k] + lead, 0), len(until) - 1)
             total = base[k] + until[at_shoulder] + hole * inside
             if total + weight[k] * closed <= best:
@@ -56,3 +67,76 @@ def likeliest(
             if total > best:
                 best, best_shape, best_place, best_share = total, k, place, share
     return best_shape, best_place, best, best_share
+
+
+@compiled
+def summits_over(
+    along: Floats, shares: Floats, depths: Floats, first_share: float, reach: Floats, summits: Floats
+) -> None:
+    """Where the outermost point (k, n) of k outlines has to be for them to pass through each of n points.
+
+    along (n,): stations; shares (n,): of the way from side to side. depths (k, lanes): how far the outlines fall behind
+    their outermost point in lanes from first_share to 1 - first_share, in reaches (k,)."""
+    last = depths.shape[1] - 1
+    for j in range(len(along)):
+        place = min(max((shares[j] - first_share) / (1.0 - 2.0 * first_share), 0.0), 1.0) * last
+        lane = min(int(place), last - 1)
+        part = place - lane
+        for k in range(len(reach)):
+            summits[k, j] = along[j] + reach[k] * (depths[k, lane] * (1.0 - part) + depths[k, lane + 1] * part)
+
+
+@compiled
+def _median(values: Floats) -> Any:
+    ordered = np.sort(values)
+    return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+
+
+@compiled
+def outline_through(
+    size: Floats, at: NDArray[np.int64], top: int, seen: NDArray[np.bool_], shape: Floats, reach: float, step: float
+) -> tuple[float, float]:
+    """How much farther out than place `top` the outermost point of an outline lies, and its standard deviation, in px,
+    from the steepest places near the outline; robust. Some lane has to be seen.
+
+    size (lanes, m): steps, at places `step` px apart. Of each lane: at, the place of the outline, seen, whether a step
+    is there, and shape, how far it lies below the outermost point, in reaches. reach: px.
+    """
+    lanes, last = size.shape[0], size.shape[1] - 1
+    residual, depth = np.empty(lanes), np.empty(lanes)
+    n = 0
+    for lane in range(lanes):
+        if not seen[lane]:
+            continue
+        best = -AROUND
+        for i in range(1 - AROUND, AROUND + 1):
+            if size[lane, min(max(at[lane] + i, 0), last)] > size[lane, min(max(at[lane] + best, 0), last)]:
+                best = i
+        here = at[lane] + min(max(best, 1 - AROUND), AROUND - 1)
+        place = min(max(here, 0), last)
+        before, peak = size[lane, min(max(here - 1, 0), last)], size[lane, place]
+        after = size[lane, min(max(here + 1, 0), last)]
+        bend = before - 2.0 * peak + after
+        fraction = min(max(0.5 * (before - after) / bend, -0.5), 0.5) if bend < 0 else 0.0
+        residual[n] = step * (place - top + fraction - 0.5) + reach * shape[lane]
+        depth[n] = shape[lane]
+        n += 1
+    residual, depth = residual[:n], depth[:n]
+    # Outermost point and length of the outline together; the length is held to the shape's own.
+    farther, longer, variance = _median(residual), 0.0, 0.0
+    held = 1.0 / max(LENGTH_HELD * reach, 0.1) ** 2
+    for _ in range(4):
+        scatter = max(LEAST_SCATTER_PX, 1.4826 * _median(np.abs(residual - farther + depth * longer)))
+        a, b, d, x, y = 1e-6, 0.0, held, 0.0, 0.0
+        for j in range(n):
+            off = (residual[j] - farther + depth[j] * longer) / (2.0 * scatter)
+            weight = 1.0 / (1.0 + off * off) ** 2 / scatter**2
+            a += weight
+            b -= weight * depth[j]
+            d += weight * depth[j] * depth[j]
+            x += weight * residual[j]
+            y -= weight * residual[j] * depth[j]
+        determinant = a * d - b * b
+        farther, longer = (d * x - b * y) / determinant, (a * y - b * x) / determinant
+        variance = d / determinant
+    return farther, np.sqrt(3.0 * variance)

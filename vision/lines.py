@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 from vision.gradient_kernels import gradients, line_votes, median_roughness, ridge
-from vision.profile_kernels import refine, steps_in_rows
+from vision.profile_kernels import refine, steps_in_rows, stretches
 
 Array = NDArray[Any]  # of floats
 
@@ -132,15 +132,9 @@ class Profiles:
 def visible_stretch(normal: Array, rho: Array, half: Array) -> tuple[Array, Array]:
     """First and last place (k,) along each line inside the image of half extents `half` (2,); equal where it misses
     it."""
-    direction = np.column_stack([-normal[:, 1], normal[:, 0]])
-    foot = normal * rho[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        one, two = (-half - foot) / direction, (half - foot) / direction
-    first, last = np.fmin(one, two), np.fmax(one, two)
-    outside = (np.abs(direction) < 1e-9) & (np.abs(foot) > half)
-    start = np.nanmax(np.where(np.isfinite(first), first, -np.inf), axis=1)
-    end = np.nanmin(np.where(np.isfinite(last), last, np.inf), axis=1)
-    return start, np.where(outside.any(axis=1), start, np.maximum(end, start))
+    start, end = np.empty((2, len(rho)))
+    stretches(np.ascontiguousarray(normal, float), np.ascontiguousarray(rho, float), half, start, end)
+    return start, end
 
 
 def refine_lines(

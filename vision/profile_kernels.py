@@ -49,6 +49,14 @@ def _stretch(nx: float, ny: float, rho: float, half_u: float, half_v: float) -> 
 
 
 @compiled
+def stretches(normals: Floats, rhos: Floats, half: Floats, first: Floats, last: Floats) -> None:
+    """First and last place (k,) along each line inside an image of half extents `half` (2,); equal where it misses
+    it."""
+    for line in range(len(rhos)):
+        first[line], last[line] = _stretch(normals[line, 0], normals[line, 1], rhos[line], half[0], half[1])
+
+
+@compiled
 def _vote(place: Floats, offset: Floats, weight: Floats, largest: float) -> tuple[float, float]:
     """Shift and slope on which most of the offsets lie, by trying slopes up to the largest and counting offsets."""
     shift, slope, best = 0.0, 0.0, -1.0
