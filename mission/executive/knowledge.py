@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 if TYPE_CHECKING:
     from mission.executive.clock import Clock
@@ -33,8 +33,9 @@ class Tracked(BaseModel):
 
     station: float
     offset: float
-    mean: tuple[float, ...] = Field(min_length=7, max_length=7)
-    covariance: tuple[tuple[float, ...], ...] = Field(min_length=7, max_length=7)
+    mean: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    lens: Vector | None = None
     stamp_s: float
     seen_s: dict[str, float]
 
@@ -66,6 +67,7 @@ def known(perception: VisionLoop, now_s: float) -> Knowledge:
             offset=kept.model.offset,
             mean=tuple(kept.model.mean.tolist()),
             covariance=tuple(tuple(row) for row in kept.model.covariance.tolist()),
+            lens=None if kept.model.lens is None else _vector(kept.model.lens),
             stamp_s=kept.stamp_s,
             seen_s=dict(kept.seen_s),
         )
@@ -113,21 +115,26 @@ def go_on_from(perception: VisionLoop, knowledge: Knowledge, now_s: float, speed
     age_s = max(0.0, time.time() - knowledge.wall_s) * speed
     if age_s > STALE_S or not _same(perception.frame, knowledge):
         return False
-    for side, seen in knowledge.edges.items():
-        perception.edge_map.offsets.setdefault(side, {}).update(seen)
     if knowledge.tracked is not None:
         from vision.blade_model import BladeModel
+        from vision.blade_motion import SIZE
         from vision.tracker import Kept
 
-        tracked, later_s = knowledge.tracked, now_s - age_s - knowledge.t
-        model = BladeModel(tracked.station, tracked.offset, np.array(tracked.mean), np.array(tracked.covariance))
+        tracked = knowledge.tracked
+        if np.shape(tracked.mean) != (SIZE,) or np.shape(tracked.covariance) != (SIZE, SIZE):
+            return False  # of another version of this program
+        later_s = now_s - age_s - knowledge.t
+        lens = None if tracked.lens is None else np.array(tracked.lens)
+        model = BladeModel(tracked.station, tracked.offset, np.array(tracked.mean), np.array(tracked.covariance), lens)
         seen_s = {part: stamp_s + later_s for part, stamp_s in tracked.seen_s.items()}
         perception.tracker.go_on_from(Kept(model, tracked.stamp_s + later_s, seen_s))
+    for side, seen in knowledge.edges.items():
+        perception.edge_map.offsets.setdefault(side, {}).update(seen)
     return True
 
 
 class Keeping:
-    """Keeps the file up to date. A disk that refuses is told to `log` once; the flight goes on."""
+    """Keeps the file up to date. Whatever keeps it from that is told to `log` once; the flight goes on."""
 
     def __init__(self, folder: Path, perception: VisionLoop, log: Any, *, threaded: bool) -> None:
         self._folder, self._perception, self._log, self._threaded = folder, perception, log, threaded
@@ -138,20 +145,22 @@ class Keeping:
         """Until cancelled."""
         while True:
             await clock.sleep(max(KEEP_S, clock.speed * KEEP_S if self._threaded else KEEP_S))
-            knowledge = known(self._perception, clock.now())
-            if self._last is not None and _same_but_for_time(knowledge, self._last):
-                continue
             try:
-                if self._threaded:
-                    await asyncio.to_thread(write_knowledge, self._folder, knowledge)
-                else:
-                    write_knowledge(self._folder, knowledge, sync=False)
-            except OSError as error:
+                await self._keep(clock.now())
+            except Exception as error:
                 if not self._refused:
-                    self._log.error("knowledge not kept", reason=error.strerror)
+                    self._log.error("knowledge not kept", reason=f"{type(error).__name__}: {error}".splitlines()[0])
                 self._refused = True
-            else:
-                self._last, self._refused = knowledge, False
+
+    async def _keep(self, now_s: float) -> None:
+        knowledge = known(self._perception, now_s)
+        if self._last is not None and _same_but_for_time(knowledge, self._last):
+            return
+        if self._threaded:
+            await asyncio.to_thread(write_knowledge, self._folder, knowledge)
+        else:
+            write_knowledge(self._folder, knowledge, sync=False)
+        self._last, self._refused = knowledge, False
 
 
 def _same_but_for_time(one: Knowledge, other: Knowledge) -> bool:

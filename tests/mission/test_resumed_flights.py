@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,14 @@ import pytest
 
 from devices.vehicle.handover import note_in
 from devices.vehicle.keeper import Guardian
-from tests.mission.test_flights import ROOT, SQUARE, command, journal, vehicle_events, wait_for
+from mission.behaviours.approach_root import OVERLAP_M
+from mission.executive.journal import FORMAT
+from mission.executive.services import Memory, Stretch
+from mission.language.document import load
+from mission.record.folder import create
+from tests.mission.test_flights import ROOT, SHORT_BLADE, SQUARE, command, journal, vehicle_events, wait_for
+
+NEAR = ("site.turbine_north_m=40",)
 
 
 @pytest.fixture
@@ -101,3 +110,47 @@ def test_after_a_power_failure_it_begins_on_the_ground_with_a_torn_journal(logs:
     assert code == 0 and "Traceback" not in said, said
     assert visited(runs(logs)[-1])[:2] == ["launch", "square.north"]
     assert json.loads((runs(logs)[-1] / "summary.json").read_text())["outcome"] == "completed"
+
+
+def half_flown(logs: Path) -> None:
+    """The folder of a run that was cut off on its way back along the trailing side, six metres and a half from the
+    hub."""
+    run = create(logs, "v80_blade", load("missions/v80_blade.yaml", [*SHORT_BLADE, *NEAR]).resolved_yaml)
+    memory = Memory(
+        home=(0.0, 0.0, 0.0),
+        azimuth=math.radians(45.0),
+        tip_station_m=9.9,
+        passes_done=["leading"],
+        inspected={"leading": Stretch(4.0, 8.8, 0.24), "trailing": Stretch(9.2, 6.6, -0.61)},
+    )
+    configuration = {"history": {}, "taken": {}}
+    lines: list[dict[str, Any]] = [
+        {"seq": 0, "t": 0.0, "kind": "start", "format": FORMAT, "state": "preflight", **configuration},
+        {
+            "seq": 1,
+            "t": 90.0,
+            "kind": "transition",
+            "event": "in_position",
+            "key": "",
+            "from": "inspect.blade.reposition",
+        }
+        | {"to": "inspect.blade.trailing", "by": "in_position", "memory": asdict(memory), **configuration},
+    ]
+    run.journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
+
+
+@pytest.mark.timeout(300)
+def test_of_a_half_flown_inspection_only_the_rest_is_flown(logs: Path) -> None:
+    half_flown(logs)
+    code, said = resume(logs, "--lockstep")
+    assert code == 0 and "Traceback" not in said, said
+    last = runs(logs)[-1]
+    flown = visited(last)
+    assert "inspect.blade.trailing" in flown and flown[-1] == "completed"
+    assert not {"inspect.blade.leading", "inspect.blade.align_gimbal", "inspect.blade.reposition"} & set(flown)
+    frames = [json.loads(line) for line in (last / "frames" / "frames.jsonl").read_text().splitlines()]
+    assert {frame["side"] for frame in frames} == {"trailing"}
+    assert max(frame["station_m"] for frame in frames) == pytest.approx(6.6 + OVERLAP_M, abs=0.5)
+    told: dict[str, Any] = json.loads((last / "summary.json").read_text())
+    assert told["root"]["found"] and told["tip"]["radius_m"] == 9.9
+    assert told["truth"]["min_clearance_m"] >= 2.0

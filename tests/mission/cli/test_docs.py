@@ -11,7 +11,8 @@ from devices.world.settings import Faults
 from mission.cli.main import commands
 from tests.mission.cli.program import ROOT
 
-DOCUMENTS = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/faults.md", "docs/resume.md")]
+NAMES = ("README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/faults.md", "docs/resume.md")
+DOCUMENTS = [ROOT / name for name in NAMES]
 
 
 def test_every_fault_is_documented_with_its_own_settings() -> None:
