@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +74,7 @@ class BladeGate:
         model = model.seen_from(self.frame.to_blade(pose.position)).moved(there[0], there[1], settings)
         surface = self._measure(observation, {}, pose, model, tremble, late_s)
         nis, dof = innovation(model, surface, ["surface"])
-        if not nis < chi2.ppf(settings.gate, dof):
+        if not nis < bound(settings.gate, dof):
             deeper = float(surface.z[0] - surface.H[0] @ model.mean)
             where = "behind" if deeper > 0 else "before"
             text = f"the surface lies {abs(deeper):.2f} m {where} the tracked one or leans otherwise"
@@ -89,7 +90,7 @@ class BladeGate:
         off: dict[Side, float] = {}
         for side in edges:
             part_nis[side] = innovation(model, joint, ["surface", side])[0] - nis
-            if not part_nis[side] < chi2.ppf(settings.gate, 2):
+            if not part_nis[side] < bound(settings.gate, 2):
                 row = joint.parts[side].start
                 off[side] = float(joint.z[row] - joint.H[row] @ model.mean)
                 reasons.append(f"the {side} edge is seen {abs(off[side]):.2f} m from where it is tracked")
@@ -138,6 +139,12 @@ class BladeGate:
                     continue
             edges[side] = edge
         return edges, reasons
+
+
+@lru_cache
+def bound(share: float, dof: int) -> float:
+    """What χ² of so many degrees of freedom stays under in this share of cases."""
+    return float(chi2.ppf(share, dof))
 
 
 def innovation(model: BladeModel, measurement: Measurement, parts: list[str]) -> tuple[float, int]:

@@ -31,6 +31,15 @@ RECESS: Final[dict[Side, int]] = {"leading": 18, "trailing": 19}
 SIDES: Final[tuple[Side, Side]] = ("leading", "trailing")
 SIGN: Final[dict[Side, float]] = {"leading": 1.0, "trailing": -1.0}
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_CHAINS = [
+    (*np.ix_(rows, rows), rows[2])
+    for rows in (
+        (DEPTH, DEPTH_SLOPE, DEPTH_CURVATURE),
+        *((EDGE[side].start, EDGE[side].start + 1, EDGE_CURVATURE[side]) for side in SIDES),
+    )
+]
+_TWISTS = np.ix_((ACROSS_SLOPE, TWIST), (ACROSS_SLOPE, TWIST))
+_CAMBER = np.ix_((DEPTH, ACROSS_SLOPE, ACROSS_CURVATURE), (DEPTH, ACROSS_SLOPE, ACROSS_CURVATURE))
 
 
 def curvature_sigmas(station: float, settings: TrackerSettings) -> dict[int, float]:
@@ -98,13 +107,10 @@ def travel_noise(along: float, across: float, station: float, settings: TrackerS
     noise = np.zeros((SIZE, SIZE))
     sigmas = curvature_sigmas(station, settings)
     chain = wandered(along, alike_m(station, settings))
-    chains = [(DEPTH, DEPTH_SLOPE, DEPTH_CURVATURE)]
-    chains += [(EDGE[side].start, EDGE[side].start + 1, EDGE_CURVATURE[side]) for side in SIDES]
-    for rows in chains:
-        noise[np.ix_(rows, rows)] += sigmas[rows[2]] ** 2 * chain
-    noise[np.ix_((ACROSS_SLOPE, TWIST), (ACROSS_SLOPE, TWIST))] += sigmas[TWIST] ** 2 * chain[1:, 1:]
-    rows = DEPTH, ACROSS_SLOPE, ACROSS_CURVATURE
-    noise[np.ix_(rows, rows)] += sigmas[ACROSS_CURVATURE] ** 2 * wandered(across, settings.alike_across_m)
+    for rows, columns, curvature in _CHAINS:
+        noise[rows, columns] += sigmas[curvature] ** 2 * chain
+    noise[_TWISTS] += sigmas[TWIST] ** 2 * chain[1:, 1:]
+    noise[_CAMBER] += sigmas[ACROSS_CURVATURE] ** 2 * wandered(across, settings.alike_across_m)
     noise[ACROSS_CURVATURE, ACROSS_CURVATURE] += sigmas[ACROSS_CURVATURE] ** 2 * chain[2, 2]
     for recess in RECESS.values():
         noise[recess, recess] += recess_sigma(station, settings) ** 2 * chain[2, 2]
@@ -114,8 +120,10 @@ def travel_noise(along: float, across: float, station: float, settings: TrackerS
 def wandered(travel: float, alike: float) -> Array:
     """Covariance (3, 3) of place, slope and curvature that a curvature of sigma one gathers on the way."""
     # Gauss's quadrature over the way: never indefinite, however short the way is.
-    chain = np.array([led_to(travel * (1 + node) / 2, alike) for node in _NODES])
-    gathered: Array = (chain.T * _WEIGHTS) @ chain * abs(travel) / alike
+    length = abs(travel) * (1 + _NODES) / 2
+    slope = -alike * np.expm1(-length / alike)
+    chain = np.stack([alike * (length - slope), np.copysign(slope, travel), np.exp(-length / alike)])
+    gathered: Array = (chain * _WEIGHTS) @ chain.T * abs(travel) / alike
     return gathered
 
 
