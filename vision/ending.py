@@ -4,6 +4,7 @@ axis."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -75,8 +76,11 @@ class Side:
         """What speaks for an edge that goes on to stations and no further."""
         if len(self.stations) == 0:
             return np.zeros_like(station)
-        sums = np.r_[0.0, np.cumsum(self.evidence)]
-        return np.asarray(sums[np.searchsorted(self.stations, station)])
+        return np.asarray(self._sums[np.searchsorted(self.stations, station)])
+
+    @cached_property
+    def _sums(self) -> Array:
+        return np.concatenate([[0.0], np.cumsum(self.evidence)])
 
 
 def side_of(edge: Candidate, toward: Array) -> Side:

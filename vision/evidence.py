@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from vision.camera import StereoPair
 from vision.capture import Image
-from vision.evidence_kernels import longest_runs, median_steps, missing_dots, runs_about
+from vision.evidence_kernels import line_of_most, longest_runs, median_steps, missing_dots, runs_about
 from vision.lines import Profiles, steps_along
+from vision.profile_kernels import steps_before
 from vision.surface import Surface
 
 Array = NDArray[Any]  # of floats
 
-INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 3.0, 56, 24
+FIRST_INWARD, INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 5.0, 3.0, 56, 24
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
 ROUND_M = 1.0  # how far behind the surface before the camera a thick blade's edge may lie
 PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
@@ -156,42 +157,27 @@ def nearer_lines(
         last = strong.shape[2] - 1 - strong[k, seen, ::-1].argmax(axis=1)
         near = np.clip(last[:, None] - np.arange(3), 0, strong.shape[2] - 1)
         peak = near[np.arange(len(last)), np.take_along_axis(change[k, seen], near, 1).argmax(axis=1)]
-        t, depth = places[k, seen], -(5.0 + INWARD_STEP * (peak + 1))
-        first, second = np.triu_indices(len(t), 1)
-        far = np.abs(t[second] - t[first]) > 0.25 * np.ptp(places[k])
-        if not far.any():
+        t, depth = places[k, seen], -(FIRST_INWARD + INWARD_STEP * (peak + 1))
+        slope, shift, agree = line_of_most(t, depth, 0.25 * float(np.ptp(places[k])), INWARD_STEP)
+        if agree < 0.3 * INWARD_PLACES or abs(slope) > 0.5:
             continue
-        slope = (depth[second] - depth[first])[far] / (t[second] - t[first])[far]
-        shift = depth[first][far] - slope * t[first][far]
-        off = np.abs(depth - shift[:, None] - slope[:, None] * t)
-        best = int(np.argmax((off < INWARD_STEP).sum(axis=1) - 0.1 * np.minimum(off, 9).mean(axis=1)))
-        if (off[best] < INWARD_STEP).sum() < 0.3 * INWARD_PLACES or abs(slope[best]) > 0.5:
-            continue
-        turn = float(np.arctan(slope[best]))
+        turn = float(np.arctan(slope))
         normal = profile.normal[k] * np.cos(turn) - profile.direction[k] * np.sin(turn)
         normals.append(normal)
-        rhos.append(float(normal @ profile.normal[k]) * (float(profile.rho[k]) + float(shift[best])))
+        rhos.append(float(normal @ profile.normal[k]) * (float(profile.rho[k]) + shift))
     return np.array(normals).reshape(-1, 2), np.array(rhos)
 
 
 def _steps_before(profile: Profiles, blade: Blade, smooth: Image, low: Array, high: Array) -> tuple[Array, Array]:
     """Steps (k, places, samples) in grey levels at samples inward of each line, zero farther in than its outermost
     dots, and the places (k, places) along it."""
-    height, width = smooth.shape[:2]
-    centre = np.array([(width - 1) / 2, (height - 1) / 2])
     share = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES
     places = low[:, None] + (high - low)[:, None] * share
-    inward = 5.0 + INWARD_STEP * np.arange(INWARD_SAMPLES)
-    points = profile.normal[:, None] * profile.rho[:, None, None] + places[..., None] * profile.direction[:, None]
-    u = points[..., 0, None] - inward * profile.normal[:, 0, None, None] + centre[0]
-    v = points[..., 1, None] - inward * profile.normal[:, 1, None, None] + centre[1]
-    change = np.abs(steps_along(smooth, u, v))
-    depth = (
-        profile.rho[:, None]
-        - np.sort(blade.dots @ profile.normal.T, axis=0)[round(0.85 * (len(blade.dots) - 1)), :, None]
-    )
-    within = inward[1:-1] < np.maximum(depth - 3, 0)
-    return np.where(within[:, None], change, 0.0), places
+    across = np.sort(blade.dots @ profile.normal.T, axis=0)[round(0.85 * (len(blade.dots) - 1))]
+    change = np.empty((len(low), INWARD_PLACES, INWARD_SAMPLES - 2))
+    depth = profile.rho - across - 3
+    steps_before(smooth, profile.normal, profile.rho, places, depth, FIRST_INWARD, INWARD_STEP, change)
+    return change, places
 
 
 def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], noise: float) -> Array:

@@ -122,3 +122,25 @@ def missing_dots(
                 gone += innermost < off < -apart
                 past += apart < off < reach
         empty[line], beyond[line] = gone / max(gone + there, 1), past
+
+
+@compiled
+def line_of_most(places: Floats, depths: Floats, least_apart: float, within: float) -> tuple[float, float, int]:
+    """(slope, shift, how many) of the line depth = shift + slope · place through two of n points, more than least_apart
+    apart, that most of them lie within so far of; of equal ones that to which the others are nearest."""
+    best, slope, shift, most = -np.inf, 0.0, 0.0, 0
+    count = len(places)
+    for a in range(count):
+        for b in range(a + 1, count):
+            if abs(places[b] - places[a]) <= least_apart:
+                continue
+            tried = (depths[b] - depths[a]) / (places[b] - places[a])
+            at_zero = depths[a] - tried * places[a]
+            agree, apart = 0, 0.0
+            for k in range(count):
+                off = abs(depths[k] - at_zero - tried * places[k])
+                agree += off < within
+                apart += min(off, 3.0 * within)
+            if agree - 0.1 * apart / count > best:
+                best, slope, shift, most = agree - 0.1 * apart / count, tried, at_zero, agree
+    return slope, shift, most

@@ -3,7 +3,8 @@ line."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -121,9 +122,9 @@ class Profiles:
 
     def take(self, which: NDArray[np.int64]) -> Profiles:
         """Some of the lines."""
-        return Profiles(*(value[which] for value in vars(self).values()))
+        return Profiles(*(getattr(self, part.name)[which] for part in fields(self)))
 
-    @property
+    @cached_property
     def direction(self) -> Array:
         """Unit directions (k, 2)."""
         return np.column_stack([-self.normal[:, 1], self.normal[:, 0]])

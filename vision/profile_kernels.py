@@ -226,8 +226,12 @@ def steps_in_lanes(
         offset = low[0] + share * (high[0] - low[0])
         slope = low[1] + share * (high[1] - low[1])
         ahead = skew_px * (share - 0.5)
-        sums[:, 0] = 0.0
-        for i in range(count + 2 * long):
+        first = 0
+        while first < count and stations[first] < quiet[lane]:
+            size[lane, first] = 0.0
+            first += 1
+        sums[:, first] = 0.0
+        for i in range(first, count + 2 * long):
             m = min(max(i - long, 0), count - 1)
             across, along = offset + slope * stations[m], stations[m] + ahead
             u = along * toward[0] - across * toward[1] + centre_u
@@ -235,9 +239,9 @@ def steps_in_lanes(
             outside[m] = u < 1 or v < 1 or u > width - 2 or v > height - 2
             for c in range(channels):
                 sums[c, i + 1] = sums[c, i] + _tone(image, u, v, c)
-        for m in range(count):
+        for m in range(first, count):
             size[lane, m] = 0.0
-            if outside[m] or stations[m] < quiet[lane]:
+            if outside[m]:
                 continue
             here = m + long
             brief, lasting = 0.0, 0.0
@@ -270,3 +274,36 @@ def seen_in_lanes(size: Floats, least: float, back: int, slack: int, seen: Float
                 here = seen[lane, m]
                 seen[lane, m] = max(here, 0.95 * max(before, seen[lane, m + 1]))
                 before = here
+
+
+@compiled
+def steps_before(
+    image: Image, normals: Floats, rhos: Floats, places: Floats, depths: Floats, first_px: float, step_px: float,
+    change: Floats,
+) -> None:  # fmt: skip
+    """Steps, written to change (k, m, n - 2), at n samples from first_px inward of each of k lines on, step_px apart,
+    at places (k, m) along it; zero farther in than depths (k,)."""
+    lines, count, inner = change.shape
+    channels = image.shape[2]
+    centre_u, centre_v = (image.shape[1] - 1) / 2, (image.shape[0] - 1) / 2
+    tone = np.empty((channels, inner + 2))
+    for line in range(lines):
+        nx, ny = normals[line, 0], normals[line, 1]
+        used = 0
+        while used < inner and first_px + step_px * (used + 1) < depths[line]:
+            used += 1
+        for m in range(count):
+            change[line, m] = 0.0
+            if used == 0:
+                continue
+            u = rhos[line] * nx - places[line, m] * ny + centre_u
+            v = rhos[line] * ny + places[line, m] * nx + centre_v
+            for i in range(used + 2):
+                inward = first_px + step_px * i
+                for c in range(channels):
+                    tone[c, i] = _tone(image, u - inward * nx, v - inward * ny, c)
+            for i in range(used):
+                most = 0.0
+                for c in range(channels):
+                    most = max(most, abs(tone[c, i + 2] - tone[c, i]))
+                change[line, m, i] = most
