@@ -14,6 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.board import BoardViews
+from vision.calibration_doubts import WANTED_VIEWS, doubts_of
+from vision.calibration_fit import CELLS, CameraFit, Nominal
 from vision.camchain import stereo_of_opencv
 from vision.camera import Camera, StereoPair
 
@@ -21,59 +24,10 @@ Array = NDArray[np.float64]
 Choice = Literal["auto", "free", "held"]
 
 FEWEST_VIEWS = 3
-WANTED_VIEWS = 10
-WANTED_TILT = np.deg2rad(15)  # spread of the board's tilt among the views
-WANTED_COVERAGE = 0.5
-LARGEST_FOCAL_SIGMA = 0.01  # of the focal length
-NOMINAL_TOLERANCE = 0.03  # by which a lens may differ from its data sheet
-CELLS = (8, 6)
-SEARCH_PX = 1000  # the board is looked for in pictures no wider than this
 
 
 class CalibrationError(ValueError):
     """The data cannot be calibrated from at all; one line for a person."""
-
-
-@dataclass(frozen=True)
-class BoardViews:
-    """Corners of one board seen by both cameras at the same instants.
-
-    image_size (width, height). board (n, 3): the corners on the board, in units of one square. left, right: for each
-    view (n, 2) in pixels, or None where that camera did not see the whole board. square_m: the length of a square where
-    known.
-    """
-
-    image_size: tuple[int, int]
-    board: Array
-    left: tuple[Array | None, ...]
-    right: tuple[Array | None, ...]
-    square_m: float | None = None
-
-
-@dataclass(frozen=True)
-class Nominal:
-    """What the data sheets say: focal length in pixels and distance of the lenses in metres, None where unknown."""
-
-    focal_px: float | None = None
-    baseline_m: float | None = None
-
-
-@dataclass(frozen=True)
-class CameraFit:
-    """One camera. rms_px: reprojection error; view_rms_px (views,) of each view; residuals (n, 2) px of every corner at
-    its place in `corners` (n, 2). focal_sigma_px: of fx as the fit claims, NaN where it was held. tilt (views,): angle
-    in radians between the board's normal and the optical axis. coverage (rows, columns): corners per cell of the
-    image."""
-
-    camera: Camera
-    held: bool
-    rms_px: float
-    view_rms_px: Array
-    corners: Array
-    residuals: Array
-    focal_sigma_px: float
-    tilt: Array
-    coverage: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -94,29 +48,6 @@ class StereoFit:
     square_m: float
     scale_from: Literal["board", "baseline"]
     warnings: tuple[str, ...]
-
-
-def find_corners(image: NDArray[np.uint8], columns: int, rows: int) -> Array | None:
-    """Inner corners (rows * columns, 2) of a chessboard in a picture, row by row, to a fraction of a pixel; None where
-    the whole board is not in view."""
-    grey = image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
-    factor = max(1, -(-grey.shape[1] // SEARCH_PX))
-    small = grey if factor == 1 else cv2.resize(grey, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
-    found, rough = cv2.findChessboardCornersSB(small, (columns, rows))
-    if not found:
-        return None
-    corners = np.asarray((np.asarray(rough).reshape(-1, 2) + 0.5) * factor - 0.5, np.float32)
-    spacing = float(np.linalg.norm(np.diff(corners.reshape(rows, columns, 2), axis=1), axis=2).min())
-    reach = int(np.clip(spacing / 4, 2, 15))
-    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 1e-3)
-    refined = cv2.cornerSubPix(grey, corners.reshape(-1, 1, 2), (reach, reach), (-1, -1), stop)
-    return np.asarray(refined, float).reshape(-1, 2)
-
-
-def board_points(columns: int, rows: int) -> Array:
-    """The corners (rows * columns, 3) of a board in units of one square, row by row."""
-    v, u = np.mgrid[0:rows, 0:columns]
-    return np.column_stack([u.ravel(), v.ravel(), np.zeros(rows * columns)]).astype(float)
 
 
 def fit_camera(
@@ -195,7 +126,7 @@ def calibrate_stereo(views: BoardViews, nominal: Nominal | None = None, choice: 
     held = None
     if nominal.focal_px is not None:
         held = tuple(fit_camera(views.board, side, views.image_size, nominal.focal_px) for side in seen)
-    doubts = _doubts(free[0], free[1], nominal)
+    doubts = doubts_of(free[0], free[1], nominal)
     chosen: Literal["free", "held"] = "held" if choice == "held" or (choice == "auto" and doubts and held) else "free"
     left, right = held if chosen == "held" and held is not None else free
     both = [(a, b) for a, b in zip(views.left, views.right, strict=True) if a is not None and b is not None]
@@ -267,34 +198,6 @@ def _between(
         flags=cv2.CALIB_FIX_INTRINSIC,
     )
     return float(rms), np.asarray(rotation, float), np.asarray(shift, float).reshape(3)
-
-
-def _doubts(left: CameraFit, right: CameraFit, nominal: Nominal) -> list[str]:
-    """Why the free fits may not be trusted, in plain words."""
-    doubts = []
-    for name, fit in (("left", left), ("right", right)):
-        focal = fit.camera.fx
-        share = fit.focal_sigma_px / focal
-        if not share < LARGEST_FOCAL_SIGMA:
-            doubts.append(
-                f"the {name} focal length is known to ±{share:.0%} only ({focal:.0f} ± {fit.focal_sigma_px:.0f} px)"
-            )
-        if nominal.focal_px is not None and abs(focal / nominal.focal_px - 1) > NOMINAL_TOLERANCE:
-            doubts.append(f"the {name} focal length comes out as {focal:.0f} px, nominal {nominal.focal_px:.0f} px")
-    if abs(np.log(left.camera.fx / right.camera.fx)) > NOMINAL_TOLERANCE:
-        doubts.append(f"the two focal lengths differ: {left.camera.fx:.0f} and {right.camera.fx:.0f} px")
-    if not doubts:
-        return []
-    tilt = float(np.degrees(max(left.tilt.max(), right.tilt.max())))
-    if np.deg2rad(tilt) < WANTED_TILT:
-        doubts.append(f"the board was tilted by {tilt:.1f}° at most: tilt it by 15 to 45° about both axes")
-    views = min(len(left.tilt), len(right.tilt))
-    if views < WANTED_VIEWS:
-        doubts.append(f"there are only {views} views: take {WANTED_VIEWS} to 30")
-    share = min(float((fit.coverage > 0).mean()) for fit in (left, right))
-    if share < WANTED_COVERAGE:
-        doubts.append(f"the corners cover {share:.0%} of the image only: bring the board into every corner of it")
-    return doubts
 
 
 def _coverage(corners: Array, image_size: tuple[int, int]) -> NDArray[np.int64]:

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.calibration import CELLS, CameraFit, StereoFit
+from vision.calibration import StereoFit
+from vision.calibration_fit import CELLS, CameraFit
 from vision.calibration_laser import LaserFit
 
 MARGIN, SCALE_PX = 24, 480

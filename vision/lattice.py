@@ -62,6 +62,8 @@ def find_lattice(uv: Array, level: Array, shade: Array) -> Lattice | None:
     for _, start, steps in seeds[:SEEDS]:
         if start in used:
             continue
+        if 3 * len(best) > 2 * len(seeds):
+            break  # most of what lies evenly is in it already
         grown = _held(uv, _grown(uv, level, shade, {(0, 0): start}, steps))
         used |= set(grown.values())
         if len(grown) > len(best):

@@ -65,6 +65,15 @@ def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = Non
     )
 
 
+def grid_of(image: Image) -> Dots | None:
+    """The dots of a laser-on image (h, w) or (h, w, 3) with rows and columns counted from the first that is seen."""
+    small, scale = _at_working_size(image)
+    spots, lattice = dots_of(laser_signal(small), green(small))
+    if lattice is None:
+        return None
+    return Dots((spots.uv[lattice.member] + 0.5) / scale - 0.5, lattice.row, lattice.column)
+
+
 def dots_of(signal: Signal, bright: Image) -> tuple[BrightSpots, Lattice | None]:
     """The spots and the lattice that some of them form; its faint dots are sought where it says that they are."""
     spots = bright_spots(signal)

@@ -26,7 +26,7 @@ def calibrate(
         "camchain.yaml"
     ),
     report: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write calibration.txt and coverage.png there.")
+        Path | None, typer.Option(metavar="DIR", help="Write calibration.html, calibration.txt and coverage.png there.")
     ] = None,
     board: Annotated[str, typer.Option(metavar="CxR", help="Inner corners of the board, across x down.")] = "9x6",
     square_mm: Annotated[float | None, typer.Option(min=0.1, max=10000, help="Length of one square.")] = None,
@@ -55,8 +55,8 @@ def calibrate(
     thirty pairs, the board tilted by 15 to 45 degrees and brought into every corner. Data that cannot carry the focal
     lengths are called so, and the nominal lens is held instead when it is known (--focal-mm and --pixel-um).
 
-    For the laser, SOURCE holds one folder for each wall, with left, right, left_laser and right_laser pictures, at two
-    or more distances.
+    For the laser, SOURCE holds one folder for each wall, with left_laser and right_laser pictures that show the whole
+    grid (and left and right, the laser off, where the wall is patterned), at two or more distances.
 
     \b
     Examples:
@@ -107,9 +107,13 @@ def _stereo(
     if report is not None:
         import cv2
 
+        from mission.cli.calibration_page import page
+
         report.mkdir(parents=True, exist_ok=True)
         (report / "calibration.txt").write_text(text, "utf-8")
-        (report / "coverage.png").write_bytes(cv2.imencode(".png", coverage_picture(found))[1].tobytes())
+        picture = cv2.imencode(".png", coverage_picture(found))[1].tobytes()
+        (report / "coverage.png").write_bytes(picture)
+        (report / "calibration.html").write_text(page(found, text, picture), "utf-8")
     print(text, end="")
     print(f"\nwritten to {out}" + (f", report in {report}" if report is not None else ""))
 
@@ -129,7 +133,7 @@ def _laser(source: Path, camchain: Path | None, rows: int, columns: int, fan_deg
     stereo = read_camchain(camchain)
     fan = float(np.deg2rad(fan_deg))
     nominal = LaserGrid(rows, columns, (fan, fan))
-    text = laser_text(fit_laser(read_walls(source, stereo, nominal), stereo, nominal))
+    text = laser_text(fit_laser(read_walls(source, nominal), stereo, nominal))
     if report is not None:
         report.mkdir(parents=True, exist_ok=True)
         (report / "laser.txt").write_text(text, "utf-8")

@@ -9,16 +9,19 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mission.cli.errors import CommandError
+from mission.cli.stored_images import ENDINGS, read_image
 
 if TYPE_CHECKING:
-    from vision.calibration import BoardViews, Nominal
+    from vision.board import BoardViews
+    from vision.calibration_fit import Nominal
     from vision.calibration_laser import WallDots
-    from vision.camera import LaserGrid, StereoPair
+    from vision.camera import LaserGrid
+    from vision.capture import Image
+    from vision.observation import Dots
 
 T = TypeVar("T", bound=BaseModel)
 
 LARGEST_FILE = 64 * 1024 * 1024
-PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 Point = tuple[float, float]
 Count = Annotated[int, Field(ge=0, le=1000)]
@@ -63,7 +66,7 @@ class WallFile(_File):
 
 def read_corners(path: Path) -> tuple[BoardViews, DataSheet]:
     """Corners from a JSON file, with the data sheet that it carries."""
-    from vision.calibration import BoardViews
+    from vision.board import BoardViews
 
     file = _validated(CornerFile, path)
     count = len(file.object_points)
@@ -81,7 +84,7 @@ def read_corners(path: Path) -> tuple[BoardViews, DataSheet]:
 def find_boards(folder: Path, board: str) -> BoardViews:
     """Corners of a board (`9x6`: inner corners across and down) in a folder's pictures: left/NAME and right/NAME, or
     left_NAME and right_NAME."""
-    from vision.calibration import BoardViews, board_points, find_corners
+    from vision.board import BoardViews, board_points, find_corners
 
     columns, rows = _board_size(board)
     sides: dict[str, list[Any]] = {"left": [], "right": []}
@@ -89,7 +92,7 @@ def find_boards(folder: Path, board: str) -> BoardViews:
     pairs = _pairs(folder)
     for pair in pairs:
         for side, path in zip(sides, pair, strict=True):
-            image = _picture(path)
+            image = read_image(path)
             here = (image.shape[1], image.shape[0])
             if size is not None and here != size:
                 raise CommandError(f"{path}: {here[0]} x {here[1]} px, the others are {size[0]} x {size[1]}")
@@ -104,18 +107,18 @@ def find_boards(folder: Path, board: str) -> BoardViews:
     return BoardViews(size, board_points(columns, rows), tuple(sides["left"]), tuple(sides["right"]))
 
 
-def read_walls(source: Path, stereo: StereoPair, laser: LaserGrid) -> list[WallDots]:
-    """Dots from a JSON file, or from a folder with one folder of pictures (left, right, left_laser, right_laser) a
-    wall."""
+def read_walls(source: Path, laser: LaserGrid) -> list[WallDots]:
+    """Dots from a JSON file, or from a folder with one folder of pictures a wall: left_laser and right_laser, and, for
+    dots on a patterned wall, left and right beside them."""
     if source.is_dir():
-        return _seen_walls(source, stereo, laser)
+        return _seen_walls(source, laser)
     walls = _validated(WallFile, source).walls
     return [_common(wall.left, wall.right, laser, f"{source}: walls[{number}]") for number, wall in enumerate(walls)]
 
 
 def nominal_of(sheet: DataSheet, focal_mm: float | None, pixel_um: float | None, baseline_mm: float | None) -> Nominal:
     """The data sheet with what the command line says instead."""
-    from vision.calibration import Nominal
+    from vision.calibration_fit import Nominal
 
     focal, pixel = focal_mm or sheet.focal_length_mm, pixel_um or sheet.pixel_um
     baseline = baseline_mm or sheet.baseline_mm
@@ -149,7 +152,7 @@ def _pairs(folder: Path) -> list[tuple[Path, Path]]:
         raise CommandError(f"{folder}: neither a folder of pictures nor a .json file of corners")
     found: dict[str, dict[str, Path]] = {"left": {}, "right": {}}
     for path in sorted(folder.rglob("*")):
-        if path.suffix.lower() not in PICTURES:
+        if path.suffix.lower() not in ENDINGS:
             continue
         for side, names in found.items():
             if path.parent.name == side:
@@ -162,44 +165,44 @@ def _pairs(folder: Path) -> list[tuple[Path, Path]]:
     return [(found["left"][name], found["right"][name]) for name in both]
 
 
-def _picture(path: Path) -> Any:
-    import cv2
-
-    data = np.frombuffer(path.read_bytes(), np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-    if image is None:
-        raise CommandError(f"{path}: not a picture that can be read")
-    return image
-
-
-def _seen_walls(folder: Path, stereo: StereoPair, laser: LaserGrid) -> list[WallDots]:
-    from vision.camera import RigGeometry
-    from vision.capture import StereoFrames
-    from vision.pipeline import Eye
-
-    eye = Eye(RigGeometry(stereo, laser))
+def _seen_walls(folder: Path, laser: LaserGrid) -> list[WallDots]:
     walls = []
     for place in sorted(path for path in folder.iterdir() if path.is_dir()):
-        images = []
-        for name in ("left", "right", "left_laser", "right_laser"):
-            path = next((place / f"{name}{end}" for end in PICTURES if (place / f"{name}{end}").exists()), None)
-            if path is None:
-                raise CommandError(f"{place}: {name}.png is missing; a wall needs left, right, left_laser, right_laser")
-            images.append(_picture(path))
-        try:
-            seen = eye.observe(StereoFrames(0.0, *images))
-        except ValueError as error:
-            raise CommandError(f"{place}: {error}") from None
-        if seen.dots_left is None or seen.dots_right is None:
-            raise CommandError(f"{place}: no dots: {'; '.join(seen.reasons) or 'too few were found'}")
-        sides: list[list[Any]] = [
-            list(zip(dots.row.tolist(), dots.column.tolist(), *dots.uv.T.tolist(), strict=True))
-            for dots in (seen.dots_left, seen.dots_right)
-        ]
+        sides = []
+        for side in ("left", "right"):
+            dots = _whole_grid(place, side, laser)
+            sides.append(list(zip(dots.row.tolist(), dots.column.tolist(), *dots.uv.T.tolist(), strict=True)))
         walls.append(_common(sides[0], sides[1], laser, str(place)))
     if not walls:
-        raise CommandError(f"{folder}: no folders of walls in it, one with four pictures for each wall")
+        raise CommandError(f"{folder}: no folders of walls in it, one with left_laser.png and right_laser.png each")
     return walls
+
+
+def _whole_grid(place: Path, side: str, laser: LaserGrid) -> Dots:
+    """The laser's dots on a wall: all rows and columns must be in view, for nothing else numbers them."""
+    from vision.single import grid_of
+
+    lit = _named(place, f"{side}_laser")
+    if lit is None:
+        raise CommandError(f"{place}: {side}_laser.png is missing; a wall needs left_laser and right_laser")
+    dark = _named(place, side)
+    if dark is not None:
+        if dark.shape != lit.shape:
+            raise CommandError(f"{place}: {side}.png and {side}_laser.png differ in size or colour")
+        lit = np.asarray(np.clip(lit.astype(np.int16) - dark + 20, 0, 255), np.uint8)
+    dots = grid_of(lit)
+    seen = (0, 0) if dots is None else (int(dots.row.max()) + 1, int(dots.column.max()) + 1)
+    if dots is None or seen != (laser.rows, laser.columns):
+        raise CommandError(
+            f"{place}: {side}_laser.png shows {seen[0]} rows and {seen[1]} columns of dots, the laser has {laser.rows} "
+            f"and {laser.columns}; the whole grid must be in view (--rows, --columns say how large it is)"
+        )
+    return dots
+
+
+def _named(place: Path, name: str) -> Image | None:
+    path = next((place / f"{name}{end}" for end in ENDINGS if (place / f"{name}{end}").exists()), None)
+    return None if path is None else read_image(path)
 
 
 def _common(

@@ -10,16 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.calibration import (
-    BoardViews,
-    CalibrationError,
-    Nominal,
-    board_points,
-    calibrate_stereo,
-    epipolar_error,
-    find_corners,
-    fit_camera,
-)
+from vision.board import BoardViews, board_points, find_corners
+from vision.calibration import CalibrationError, calibrate_stereo, epipolar_error, fit_camera
+from vision.calibration_fit import Nominal
 from vision.calibration_laser import WallDots, fit_laser, triangulated
 from vision.camera import Camera, LaserGrid, StereoPair
 from vision.capture import rotation_of
