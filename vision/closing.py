@@ -63,12 +63,13 @@ def find_closed(
     best: Closed | None = None
     for edges, sides, toward in _hypotheses(candidates[:MOST], blade, largest):
         usual = float(np.mean([edge.step for edge in edges]))
-        ending = fit_ending(smooth, noise, sides, toward, blade, usual)
+        others = WORTH * sum(edge.worth for edge in edges) + (ALONE if len(edges) == 1 else 0.0)
+        least = -np.inf if best is None else best.evidence - others
+        ending = fit_ending(smooth, noise, sides, toward, blade, usual, least)
         if ending is None or ending.share < LEAST_SHARE or ending.evidence < ending.goes_on + CLEAR:
             continue
-        evidence = ending.evidence + WORTH * sum(edge.worth for edge in edges) + (ALONE if len(edges) == 1 else 0.0)
-        if best is None or evidence > best.evidence:
-            best = Closed(edges, ending, evidence)
+        if ending.evidence > least:
+            best = Closed(edges, ending, ending.evidence + others)
     return best
 
 

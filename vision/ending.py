@@ -38,9 +38,12 @@ LEAST_LANES, UNREFINED_PX = 6, 4.0  # that an outline is fitted to, and its stan
 BORDER = 6.0  # px: an outline nearer to the image border than this is not seen to close
 
 
+SHARES = np.linspace(FIRST_SHARE, 1 - FIRST_SHARE, LANES)  # where lanes lie, 0 on the lower edge and 1 on the upper
+
+
 def _shapes() -> tuple[Array, Array]:
     """Lengths (k,) in widths of the blade and depths (k, LANES) below the outermost point, in lengths, of outlines."""
-    x = 2 * lane_shares() - 1
+    x = 2 * SHARES - 1
     found: list[tuple[float, Array]] = [(0.0, np.zeros(LANES))]
     for summit in SUMMITS:
         apart = np.where(x < summit, (summit - x) / (1 + summit), (x - summit) / (1 - summit))
@@ -49,13 +52,9 @@ def _shapes() -> tuple[Array, Array]:
     return np.array([length for length, _ in found]), np.array([depth for _, depth in found])
 
 
-def lane_shares() -> Array:
-    """Where the lanes lie between the edges (LANES,), 0 on the one and 1 on the other."""
-    return np.linspace(FIRST_SHARE, 1 - FIRST_SHARE, LANES)
-
-
 LENGTHS, DEPTHS = _shapes()
-PRIORS = LOPSIDED * np.abs(2 * lane_shares()[DEPTHS.argmin(axis=1)] - 1) * (LENGTHS > 0)
+OUTLINES = np.hypot(1.0, 2 * LENGTHS)  # length of each outline, in widths of the blade
+PRIORS = LOPSIDED * np.abs(2 * SHARES[DEPTHS.argmin(axis=1)] - 1) * (LENGTHS > 0)
 
 
 @dataclass(frozen=True)
@@ -77,6 +76,11 @@ class Side:
         if len(self.stations) == 0:
             return np.zeros_like(station)
         return np.asarray(self._sums[np.searchsorted(self.stations, station)])
+
+    @property
+    def most(self) -> float:
+        """The most that can speak for an edge that ends somewhere."""
+        return float(self._sums.max())
 
     @cached_property
     def _sums(self) -> Array:
@@ -123,9 +127,16 @@ class Ending:
 
 
 def fit_ending(
-    smooth: Image, noise: float, sides: tuple[Side, Side], toward: Array, blade: Blade, usual: float
+    smooth: Image,
+    noise: float,
+    sides: tuple[Side, Side],
+    toward: Array,
+    blade: Blade,
+    usual: float,
+    least_evidence: float = -np.inf,
 ) -> Ending | None:
-    """The likeliest end of the blade between its lower and upper side along `toward` (2,), None where none can be.
+    """The likeliest end of the blade between its lower and upper side along `toward` (2,), None where none can be, or
+    none with more evidence than the least that is of use.
 
     usual: the height of the edges' steps in grey levels.
     """
@@ -136,7 +147,7 @@ def fit_ending(
     along, aside = blade.dots @ toward, blade.dots @ across
     last_dot = float(along.max())
     wide = float(high.at(last_dot) - low.at(last_dot))
-    if wide < NARROWEST:
+    if wide < NARROWEST or low.most + high.most + CLOSED * float(_weight(wide).max()) <= least_evidence:
         return None
     middle = float(high.at(last_dot) + low.at(last_dot)) / 2
     start, stop = visible_stretch(across[None], np.array([middle]), centre - 2)
@@ -147,18 +158,17 @@ def fit_ending(
     s = np.arange(first, far, STEP)
     if len(s) < 4 * LONG_BOX:
         return None
-    shares = lane_shares()
     skew = blade.skew(last_dot * toward + middle * across, toward)
     # A lane may not end before the dots it carries.
     share_of = (aside - low.at(along)) / np.maximum(high.at(along) - low.at(along), 1.0)
     along = along - skew * (share_of - 0.5) * wide
-    beside = np.abs(share_of[:, None] - shares) * wide < 4.0
+    beside = np.abs(share_of[:, None] - SHARES) * wide < 4.0
     quiet = np.where(beside, along[:, None], -np.inf).max(axis=0) - 4.0
     least = max(3.0, 1.5 * noise, 0.2 * usual, 0.9 * blade.texture)
     size, seen = np.empty((2, LANES, len(s)))
     lower, upper = (np.array([side.offset, side.slope]) for side in sides)
     boxes = (BOX, LONG_BOX)
-    steps_in_lanes(smooth, lower, upper, toward, skew * wide, shares, s, quiet, boxes, NO_STREAK, least, size)
+    steps_in_lanes(smooth, lower, upper, toward, skew * wide, SHARES, s, quiet, boxes, NO_STREAK, least, size)
     seen_in_lanes(size, least, int(HIDDEN_PX / STEP), SLACK, seen)
     return _best(s, seen, size, sides, toward, blade, share_of, along, border, wide, skew)
 
@@ -178,7 +188,6 @@ def _best(
 ) -> Ending | None:
     low, high = sides
     across = np.array([-toward[1], toward[0]])
-    shares = lane_shares()
     reach = LENGTHS * wide
     # Dots that the outline has to hold, and missing ones that it should not.
     strays = int(blade.strays * len(along) + 0.9) if len(along) >= 20 else 0
@@ -198,7 +207,7 @@ def _best(
         shift,
         np.rint(reach / STEP).astype(np.int64),
         PRIORS,
-        wide * np.hypot(1.0, 2 * LENGTHS) / CORRELATED_PX,
+        _weight(wide),
         np.ceil((needed - s[0]) / STEP).astype(np.int64),
         (holes - s[0]) / STEP,
         low.until(ahead) + high.until(ahead),
@@ -217,11 +226,16 @@ def _best(
     if lanes_seen.sum() >= LEAST_LANES:
         farther, sigma = outline_through(size, at, top, lanes_seen, DEPTHS[k], float(reach[k]), STEP)
         station, scatter = station + farther, float(np.hypot(0.5, sigma))
-    lane_share = float(shares[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
+    lane_share = float(SHARES[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
     lane = float(low.at(station) + lane_share * (high.at(station) - low.at(station)))
     outermost = station + skew * (lane_share - 0.5) * wide
     step = float(np.median(size[np.arange(LANES), np.maximum(at, 0)][lanes_seen])) if lanes_seen.any() else 0.0
     return Ending(toward, outermost, lane, float(s[top] - reach[k]), share_top, scatter, step, evidence, goes_on)
+
+
+def _weight(wide: float) -> Array:
+    """How much the lanes of each shape (k,) tell, in independent places along the outline."""
+    return np.asarray(wide * OUTLINES / CORRELATED_PX)
 
 
 def _summits_over(along: Array, shares: Array, reach: Array) -> Array:

@@ -52,9 +52,11 @@ class Blade:
             return 0.0
         ray = point / self.focal
         lean = self.slope / max(1.0 - float(self.slope @ ray), 0.2)
-        across = np.array([-toward[1], toward[0]])
-        one, two = (np.r_[lean @ way, way + ray * (lean @ way)] for way in (toward, across))
-        return -float(one @ two) / float(one @ one)
+        (x, y), (ray_x, ray_y) = toward.tolist(), ray.tolist()
+        deeper, aside = float(lean @ toward), float(lean[1] * x - lean[0] * y)
+        one = (deeper, x + ray_x * deeper, y + ray_y * deeper)
+        two = (aside, -y + ray_x * aside, x + ray_y * aside)
+        return float(-sum(a * b for a, b in zip(one, two, strict=True)) / sum(a * a for a in one))
 
 
 @dataclass(frozen=True)
