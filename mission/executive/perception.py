@@ -14,6 +14,7 @@ import structlog
 from devices.rig import CaptureError, Rig
 from flight.autopilot import Autopilot, VehiclePose
 from vision.capture import CameraPose, StereoFrames, camera_pose
+from vision.consistency import Watch
 from vision.landmarks import EdgeMap, TipSighting, sight_tip
 from vision.observation import BladeObservation, FarView
 
@@ -87,6 +88,7 @@ class VisionLoop:
         self._latency_s = latency_s
         self._log = structlog.get_logger() if log is None else log
         self._failure: str | None = None
+        self._claims = Watch()
         self._watching = False
         self._side: str | None = None
         self._cycle = asyncio.Condition()
@@ -102,6 +104,7 @@ class VisionLoop:
         """Start afresh with another idea of where the blade lies, as after the survey."""
         self.frame = frame
         self.tracker = self._new_tracker(frame)
+        self._claims.forget()
         self.tips: Sequence[TipSighting] = ()
         self.edge_map = EdgeMap()
 
@@ -171,6 +174,7 @@ class VisionLoop:
 
     def forget(self) -> None:
         self.tracker.forget()
+        self._claims.forget()
         self.tips = ()
 
     def record(self, side: str | None) -> None:
@@ -225,6 +229,7 @@ class VisionLoop:
         update = self.tracker.update(observation, pose)
         estimate = self.tracker.estimate(frames.stamp_s, pose)
         self.cycles += 1
+        self._hold_to_claims(update)
         if update.accepted and estimate is not None:
             self.accepted += 1
             self.last_accepted_s = frames.stamp_s
@@ -236,6 +241,15 @@ class VisionLoop:
         self.observation = observation
         async with self._cycle:
             self._cycle.notify_all()
+
+    def _hold_to_claims(self, update: UpdateResult) -> None:
+        """Tell the log when the blade has been seen elsewhere than predicted for seconds, more than sigmas allow."""
+        if not update.accepted or not self._claims.add(update.nis, update.dof):
+            return
+        if self._claims.excess is not None:
+            self._log.warning("tracker inconsistent", nis_per_dof=round(self._claims.excess, 2))
+        else:
+            self._log.info("tracker consistent again")
 
     def _expected_axis(self) -> float:
         """Direction of the blade's axis in the image, as survey and gimbal have it now: good to a few degrees."""

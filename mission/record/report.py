@@ -38,7 +38,11 @@ def write_report(folder: RunFolder, summary: Mapping[str, Any]) -> Path:
         views=[Markup(view) for view in views(history)],
         timeline=Markup(timeline(_spans(summary))),
         standoff=Markup(_standoff(history, summary)),
-        sides=[_side(folder, history, summary, side) for side in summary["coverage"]],
+        sides=[
+            _side(folder, history, number, side, covered, several="blades" in summary)
+            for number, blade in enumerate(summary.get("blades", [summary]))
+            for side, covered in blade["coverage"].items()
+        ],
         vision=_vision(summary),
         reasons=_reasons(history),
         events=_events(history),
@@ -62,7 +66,7 @@ def _cards(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         ("standoff RMSE, estimated", _metres(standoff["rmse_m"])),
         ("standoff RMSE, truth", _metres(truth.get("standoff_rmse_m"))),
         ("least clearance, truth", _metres(truth.get("min_clearance_m"))),
-        *((f"of the {side} edge", _percent(share)) for side, share in summary["coverage"].items()),
+        *((f"of {_of_blades(summary, side)}", _percent(share)) for side, share in summary["coverage"].items()),
         ("tip error, truth", _metres(truth.get("tip_error_m"))),
         ("photographs", str(summary["frames"])),
         ("vision cycle, median", f"{vision['p50_ms']:.0f} ms" if vision["p50_ms"] is not None else None),
@@ -115,10 +119,17 @@ def _standoff(history: RunHistory, summary: Mapping[str, Any]) -> str:
     return over_time([Series("nearest", nearest), Series("distance", distance)], unit=" m", bands=bands, rules=rules)
 
 
-def _side(folder: RunFolder, history: RunHistory, summary: Mapping[str, Any], side: str) -> dict[str, Any]:
+def _of_blades(summary: Mapping[str, Any], side: str) -> str:
+    blades = len(summary.get("blades", ()))
+    return f"the {side} edges, {blades} blades" if blades else f"the {side} edge"
+
+
+def _side(
+    folder: RunFolder, history: RunHistory, blade: int, side: str, covered: float, *, several: bool
+) -> dict[str, Any]:
     turbine = history.mission["turbine"]
     root_m = turbine["root_radius_m"]
-    frames = [line for line in history.frames if line["side"] == side]
+    frames = [line for line in history.frames if line["side"] == side and line["blade"] == blade]
     stretches = [(*line["edge_m"], "covered") for line in frames if _counts(line)]
     marks = [
         (line["station_m"], "taken" if _counts(line) else "refused", f"{line['file']} at {line['station_m']:.1f} m")
@@ -126,9 +137,9 @@ def _side(folder: RunFolder, history: RunHistory, summary: Mapping[str, Any], si
         if line.get("station_m") is not None
     ]
     return {
-        "name": side,
+        "name": f"blade {blade + 1}, {side}" if several else side,
         "count": len(frames),
-        "covered": f"{_percent(summary['coverage'][side])} of the edge",
+        "covered": f"{_percent(covered)} of the edge",
         "map": Markup(blade_map(stretches, marks, root_m, root_m + turbine["blade_length_m"])),
         "thumbs": _thumbs(folder, frames),
     }
@@ -167,11 +178,26 @@ def _vision(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("longest gap", _seconds(vision["longest_gap_s"])),
         ("median of a cycle", _milliseconds(vision["p50_ms"])),
         ("99 % of cycles under", _milliseconds(vision["p99_ms"])),
+        *_claims(summary.get("tracker") or {}),
         ("setpoints sent", str(setpoints["sent"])),
         ("setpoints a wall second", f"{setpoints['rate_hz']:.1f}" if setpoints["rate_hz"] is not None else None),
         ("longest gap between setpoints", _milliseconds(setpoints["longest_gap_ms"])),
     ]
     return [(name, value) for name, value in rows if value is not None]
+
+
+def _claims(tracker: Mapping[str, Any]) -> list[tuple[str, str | None]]:
+    """How well the tracker's claims held."""
+    ratio, interval = tracker.get("nis_per_dof"), tracker.get("interval")
+    rows: list[tuple[str, str | None]] = []
+    if ratio is not None and interval is not None:
+        rows.append(("innovations squared, of those claimed", f"{ratio:.2f} ({interval[0]:.2f} to {interval[1]:.2f})"))
+    for name, text in (("following", "distance within 1σ, 2σ of truth"), ("bridging", "the same while bridging")):
+        covered = (tracker.get("distance") or {}).get(name)
+        if covered is not None:
+            shares = f"{_percent(covered['within_1_sigma'])}, {_percent(covered['within_2_sigma'])}"
+            rows.append((text, f"{shares} (σ {1000 * covered['sigma_m']:.0f} mm)"))
+    return rows
 
 
 def _milliseconds(value: float | None) -> str | None:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mission.record.coverage import SHARP, share
+from mission.record.blades import blades_of, found, together
+from mission.record.consistency import consistency_of
 from mission.record.folder import RunFolder
 from mission.record.history import RunHistory
 from mission.record.row_file import plain
@@ -31,6 +32,7 @@ def summarise(history: RunHistory) -> Mapping[str, Any]:
     duration_s, wall_s = history.duration_s, history.wall_s
     end = history.end or {}
     last = history.visits[-1].state if history.visits else None
+    blades = blades_of(history)
     summary: dict[str, Any] = {
         "mission": history.mission.get("mission"),
         "run": history.folder.name,
@@ -47,13 +49,16 @@ def summarise(history: RunHistory) -> Mapping[str, Any]:
             for visit in history.visits
         ],
         "standoff": _standoff(history),
-        "coverage": _coverage(history),
-        "tip": _found(history.memory.get("tip_station_m")),
-        "root": _found(history.memory.get("root_station_m")),
+        "coverage": together(blades),
+        "tip": found(history.memory.get("tip_station_m")),
+        "root": found(history.memory.get("root_station_m")),
         "vision": _vision(history.cycles),
+        "tracker": consistency_of(history),
         "frames": len(history.frames),
         "setpoints": _setpoints(history.setpoints),
     }
+    if len(blades) > 1:
+        summary["blades"] = blades
     if any(part.truth.is_file() for part in history.parts):
         summary["truth"] = _truth(history)
     result: Mapping[str, Any] = plain(summary)
@@ -105,27 +110,6 @@ def _standoff(history: RunHistory) -> Mapping[str, float | None]:
         "min_m": float(kept.min()),
         "max_m": float(kept.max()),
     }
-
-
-def _coverage(history: RunHistory) -> Mapping[str, float]:
-    """Share of the span whose edge of that side was in a recorded, sharp, accepted frame, as the program believes."""
-    turbine = history.mission.get("turbine") or {}
-    root_m = turbine.get("root_radius_m")
-    if root_m is None or turbine.get("blade_length_m") is None:
-        return {}
-    found: dict[str, list[tuple[float, float]]] = {}
-    for line in history.frames:
-        if line["side"] not in ("leading", "trailing"):
-            continue
-        stretches = found.setdefault(str(line["side"]), [])
-        if line.get("accepted") and (line.get("sharpness") or 0.0) >= SHARP and line.get("edge_m"):
-            stretches.append((line["edge_m"][0], line["edge_m"][1]))
-    tip_m = root_m + turbine["blade_length_m"]
-    return {side: share(stretches, root_m, tip_m) for side, stretches in found.items()}
-
-
-def _found(station_m: float | None) -> Mapping[str, Any]:
-    return {"found": station_m is not None, "radius_m": station_m}
 
 
 def _vision(cycles: Sequence[Mapping[str, Any]]) -> Mapping[str, float | None]:
