@@ -8,11 +8,13 @@ axes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Bayer = Literal["rggb", "bggr", "grbg", "gbrg"]
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,11 @@ class LaserGrid:
 
 @dataclass(frozen=True)
 class RigGeometry:
-    """What vision needs to know of a rig: the stereo pair (full-resolution images) and the laser, None without one."""
+    """What vision needs to know of a rig: the stereo pair (full-resolution images) and the laser, None without one.
+
+    bayer: images with one channel are the raw mosaic of colour cameras, and these are the colours of its first two
+    rows' first two pixels; None: they are grey."""
 
     stereo: StereoPair
     laser: LaserGrid | None = None
+    bayer: Bayer | None = None

@@ -18,6 +18,7 @@ from vision.evidence import Blade, OtherEye, texture_between
 from vision.explained import absent_dots, explained_dots
 from vision.grid import Matches, match_eyes, match_laser, reachable
 from vision.lines import smoothed
+from vision.mosaic import demosaiced
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import green, reduce_image, reduction_factor, to_full, tones
@@ -67,7 +68,7 @@ class Eye:
             image: Image | None = getattr(frames, name)
             if image is not None:
                 self._check_size(name, image)
-                images[name] = reduce_image(image, self.factor)
+                images[name] = reduce_image(image, self.factor, self.geometry.bayer)
         watch.lap("reduce")
         left = find_spots(_green_of(images, "left"), green(images["left_laser"]), self._reachable[0])
         right = None
@@ -204,6 +205,8 @@ def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now |
                 f"image is {image.shape[1]} × {image.shape[0]} pixels, "
                 f"the rig's camera {camera.width} × {camera.height}"
             )
+        if geometry.bayer is not None and image.ndim == 2:
+            image = demosaiced(image, geometry.bayer)
     return observe_photograph(image, now=now)
 
 

@@ -8,7 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.camera import Bayer
 from vision.capture import Image
+from vision.mosaic import reduce_mosaic
 
 Array = NDArray[Any]  # of floats
 WORKING_WIDTH = 620
@@ -22,8 +24,11 @@ def reduction_factor(width: int) -> int:
     return factor
 
 
-def reduce_image(image: Image, factor: int) -> Image:
-    """The image averaged over blocks of factor × factor pixels."""
+def reduce_image(image: Image, factor: int, bayer: Bayer | None = None) -> Image:
+    """The image averaged over blocks of factor × factor pixels; one channel is the mosaic `bayer`, if that is given,
+    and comes back as colour."""
+    if bayer is not None and image.ndim == 2:
+        return reduce_mosaic(image, factor, bayer)
     while factor > 1:
         height, width = image.shape[0] // 2, image.shape[1] // 2
         image = np.asarray(

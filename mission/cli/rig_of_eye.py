@@ -29,7 +29,7 @@ def geometry_of(path: Path) -> RigGeometry:
     table = sources.read(path)
     if table is None:
         raise MissionFileError(sources.problems)
-    entries = {key: entry for key, entry in table.entries.items() if key in ("camera", "camchain", "laser")}
+    entries = {key: entry for key, entry in table.entries.items() if key in ("camera", "camchain", "laser", "bayer")}
     parts = typed(_seeing(), Table(entries, table.location, table.size), table.location, "rig", sources.problems)
     if parts is None:
         raise MissionFileError(sources.problems)
@@ -37,7 +37,7 @@ def geometry_of(path: Path) -> RigGeometry:
         raise CommandError(
             f"{path}: names no camera and no camchain, so its pixels cannot become metres; say {EXAMPLE}"
         )
-    rig = RigFile.model_construct(kind="hardware", camera=parts.camera, camchain=parts.camchain, laser=parts.laser)
+    rig = RigFile.model_construct(kind="hardware", **dict(parts))
     try:
         return rig_geometry(rig, path.parent)
     except (ValueError, OSError) as error:
@@ -47,6 +47,7 @@ def geometry_of(path: Path) -> RigGeometry:
 def _seeing() -> Any:
     from mission.language.file_model import FileModel
     from mission.language.rig_file import CameraSection, LaserSection
+    from vision.camera import Bayer
 
     class Seeing(FileModel):
         """What the eye needs of a rig file."""
@@ -54,5 +55,6 @@ def _seeing() -> Any:
         camera: CameraSection | None = None
         camchain: str | None = None
         laser: LaserSection | None = None
+        bayer: Bayer | None = None
 
     return Seeing

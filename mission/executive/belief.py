@@ -72,7 +72,7 @@ def rig_geometry(rig: RigFile, folder: Path) -> RigGeometry:
             camera.distortion,
         )
         stereo = StereoPair(lens, lens, translation=np.array([0.0, -camera.baseline_m, 0.0]))
-    return RigGeometry(stereo, None if rig.laser is None else _laser(rig))
+    return RigGeometry(stereo, None if rig.laser is None else _laser(rig), rig.bayer)
 
 
 def _laser(rig: RigFile) -> LaserGrid:

@@ -58,6 +58,11 @@ class RigFile(FileModel):
     )
     camera: CameraSection | None = Field(None, description="The stereo pair by its data sheet.")
     camchain: str | None = Field(None, description="The stereo pair as calibrated: a Kalibr camchain beside this file.")
+    bayer: Literal["rggb", "bggr", "grbg", "gbrg"] | None = Field(
+        None,
+        description="Images with one channel are the raw mosaic of colour cameras: its first pixels, row by row. "
+        "None: they are grey.",
+    )
     laser: LaserSection | None = Field(None, description="None: a rig without structured light.")
     gimbal: Literal["autopilot", "in_process"] = Field(
         "autopilot", description="autopilot: its gimbal manager. in_process: a gimbal simulated beside the cameras."
