@@ -118,6 +118,7 @@ def _promising(normal: Array, rho: Array, blade: Blade, smooth: Image, noise: fl
     which &= (dots @ profile.normal.T - profile.rho > 5).mean(axis=0) < 0.2
     overlap = np.minimum(high, last) - np.maximum(low, first) > LEAST_RUN
     start, stop = np.where(overlap, np.maximum(low, first), first), np.where(overlap, np.minimum(high, last), last)
+    start, stop = np.where(support > LEAST_SUPPORT, low, start), np.where(support > LEAST_SUPPORT, high, stop)
     chosen = np.flatnonzero(which)
     return profile.take(chosen), start[chosen], stop[chosen]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.candidates import Candidate
+from vision.candidates import LEAST_RUN, Candidate
 from vision.capture import Image
 from vision.ending import HOLE, Ending, Side, fit_ending, side_beside, side_of
 from vision.evidence import Blade
@@ -21,6 +21,11 @@ WORTH = 10.0  # of one unit of a candidate's worth, as evidence
 ALONE = -12.0  # evidence of a blade of which one edge is not seen
 CLEAR = 5.0  # evidence by which a blade that ends must be likelier than one that goes on
 LEAST_SHARE = 0.5  # of the lanes that close
+NARROWEST, WIDEST = np.deg2rad(20), np.deg2rad(84)  # angle of a spike
+OFF_AXIS = np.deg2rad(14)  # from a spike's middle to an edge of the blade, and to its dots
+AT_CORNER = 35.0  # px along the axis from where a spike's side meets an edge to where it ends
+PAST_PX = 60.0  # past its apex, over which a side of a spike must not go on
+LEAST_WORTH = -1.0  # of an edge behind a spike
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 
 
@@ -60,7 +65,7 @@ def find_closed(
     """The likeliest blade that ends in the image, None where none is likelier than its going on.
 
     largest: angle between two edges, rad."""
-    best: Closed | None = None
+    best = _likeliest_spike(candidates, blade, (smooth.shape[1], smooth.shape[0]))
     for edges, sides, toward in _hypotheses(candidates[:MOST], blade, largest):
         usual = float(np.mean([edge.step for edge in edges]))
         others = WORTH * sum(edge.worth for edge in edges) + (ALONE if len(edges) == 1 else 0.0)
@@ -71,6 +76,89 @@ def find_closed(
         if ending.evidence > least:
             best = Closed(edges, ending, ending.evidence + others)
     return best
+
+
+def _likeliest_spike(candidates: list[Candidate], blade: Blade, size: tuple[int, int]) -> Closed | None:
+    """Two steps that meet in a point just beyond all dots: they close the blade and are not its edges, which lie
+    behind."""
+    half = (np.array(size) - 1) / 2
+    best: Closed | None = None
+    middle = np.median(blade.dots, axis=0)
+    for a, one in enumerate(candidates[:MOST]):
+        for two in candidates[a + 1 : MOST]:
+            opening = np.pi - np.arccos(np.clip(float(one.outward @ two.outward), -1, 1))
+            if not NARROWEST < opening < WIDEST:
+                continue
+            apex = np.linalg.solve(np.stack([one.outward, two.outward]), np.array([one.rho, two.rho]))
+            toward = one.outward + two.outward
+            toward = toward / np.linalg.norm(toward)
+            ahead = float(((blade.dots - apex) @ toward).max())
+            back = apex - middle
+            if (np.abs(apex) > half - 4).any() or not -90.0 < ahead < 2.0:
+                continue
+            if float(back @ toward) < np.cos(OFF_AXIS) * float(np.hypot(*back)):
+                continue
+            evidence = _up_to(one, apex, toward) + _up_to(two, apex, toward) + WORTH * (one.worth + two.worth)
+            if len(blade.absent):
+                inside = (blade.absent @ one.outward < one.rho - 4) & (blade.absent @ two.outward < two.rho - 4)
+                evidence += (HOLE if blade.grid_known else HOLE / 2) * float(inside.sum())
+            if evidence > 0 and (best is None or evidence > best.evidence):
+                sides = _behind(candidates, (one, two), apex, toward)
+                shoulder = min((_far_end(side, toward) for side in (one, two)), default=0.0)
+                across = np.array([-toward[1], toward[0]])
+                sigma = float(np.hypot(*(side.profile.rho_sigma[side.index] for side in (one, two))))
+                sigma /= np.sqrt(2) * np.sin(opening / 2)
+                ending = Ending(
+                    toward, float(apex @ toward), float(apex @ across), shoulder, 1.0, sigma, evidence, -np.inf
+                )
+                best = Closed(sides, ending, evidence)
+    return best
+
+
+def _up_to(side: Candidate, apex: Array, toward: Array) -> float:
+    """What a step says for a side of a spike, from where it comes into view or begins, up to the apex and no
+    further."""
+    seen = side_of(side, toward)
+    station = float(apex @ toward)
+    start = _far_end(side, toward)
+    if station - start < LEAST_RUN:
+        return -np.inf
+    before = (seen.stations > start - 1) & (seen.stations < station - 4)
+    past = (seen.stations > station + 4) & (seen.stations < station + PAST_PX)
+    return float(seen.evidence[before].sum() - seen.evidence[past].sum())
+
+
+def _far_end(side: Candidate, toward: Array) -> float:
+    direction = side.profile.direction[side.index]
+    foot = side.rho * float(side.outward @ toward)
+    return min(foot + place * float(direction @ toward) for place in side.ends)
+
+
+def _behind(
+    candidates: list[Candidate], sides: tuple[Candidate, Candidate], apex: Array, toward: Array
+) -> tuple[Candidate, ...]:
+    """The blade's own edges, nearly along the axis of a spike, that go on from where its sides end: the best of each
+    side of it; none, one or two."""
+    found = []
+    across = np.array([-toward[1], toward[0]])
+    for sign in (1.0, -1.0):
+        side = max(sides, key=lambda edge: sign * float(edge.outward @ across))
+        fitting = []
+        for edge in candidates:
+            if edge in sides or sign * float(edge.outward @ across) < np.cos(OFF_AXIS) or edge.worth < LEAST_WORTH:
+                continue
+            corner = np.linalg.solve(np.stack([edge.outward, side.outward]), np.array([edge.rho, side.rho]))
+            station = float(corner @ toward)
+            if abs(station - _far_end(side, toward)) > AT_CORNER or not _ends(edge, toward):
+                continue
+            seen = side_of(edge, toward)
+            before = seen.stations < station - 4
+            evidence = float(seen.evidence[before].sum()) if before.sum() > 6 else -1.0
+            if evidence > 0:
+                fitting.append((evidence + WORTH * edge.worth, edge))
+        if fitting:
+            found.append(max(fitting, key=lambda one: one[0])[1])
+    return tuple(found)
 
 
 def _hypotheses(
@@ -110,7 +198,7 @@ def trimmed(edge: Candidate, toward: Array, station: float) -> Candidate:
     direction, t = profile.direction[k], profile.t[k]
     before = edge.rho * float(edge.outward @ toward) + t * float(direction @ toward) < station
     use = before & (t >= edge.ends[0] - 1) & (t <= edge.ends[1] + 1) & np.isfinite(profile.offset[k])
-    if use.sum() < 10 or use.sum() > 0.97 * ((t >= edge.ends[0] - 1) & (t <= edge.ends[1] + 1)).sum():
+    if use.sum() < 10:
         return edge
     focus = float(np.clip(0.0, t[use].min(), t[use].max()))
     place = t - focus
@@ -137,3 +225,19 @@ def trimmed(edge: Candidate, toward: Array, station: float) -> Candidate:
     moved = replace(moved, slope_sigma=slope_sigma, rho_sigma=rho_sigma)
     reach = (float(max(edge.ends[0], t[use].min())), float(min(edge.ends[1], t[use].max())))
     return replace(edge, outward=normal, rho=rho, profile=moved, ends=reach)
+
+
+def with_partner(chosen: Candidate, candidates: list[Candidate], blade: Blade, largest: float) -> tuple[Candidate, ...]:
+    """An edge, and the blade's other edge where it comes into view only where no dots lie beside it."""
+    best: tuple[float, Candidate] | None = None
+    for edge in candidates:
+        if float(-edge.outward @ chosen.outward) < np.cos(largest) or edge.worth < 0 or edge.value > -np.inf:
+            continue
+        first, last = edge.profile.t[edge.index][[0, -1]]
+        evidence = float(side_of(edge, edge.profile.direction[edge.index]).evidence.sum())
+        if edge.ends[1] - edge.ends[0] < 0.75 * (last - first) or evidence < CLEAR:
+            continue
+        evidence += WORTH * edge.worth
+        if best is None or evidence > best[0]:
+            best = (evidence, edge)
+    return (chosen,) if best is None else (chosen, best[1])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate, weigh
 from vision.capture import Image
-from vision.closing import evidence_of, find_closed, goes_on, trimmed
+from vision.closing import evidence_of, find_closed, goes_on, trimmed, with_partner
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
 from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
@@ -57,6 +57,8 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
     candidates = weigh(lines, blade, smooth, noise, other)
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
     chosen = _choose(candidates, blade.texture, largest)
+    if len(chosen) == 1:
+        chosen = with_partner(chosen[0], candidates, blade, largest)
     ending = None
     axis = float("nan") if expected is None else expected % np.pi
     closed = None
@@ -67,6 +69,9 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
         chosen = tuple(trimmed(edge, ending.toward, ending.shoulder - BEHIND_SHOULDER) for edge in closed.edges)
     elif evidence_of(chosen, blade) < 0:
         return Found((), axis, None, ("no edge: steps and dots contradict each other",))
+    if ending is not None and not chosen:
+        axis = float(np.arctan2(ending.toward[1], ending.toward[0]) % np.pi)
+        return Found((), axis, ending, ("no edge: only the spiked tip is in view",))
     if not chosen:
         best = max((c.support for c in candidates), default=0.0)
         return Found((), axis, None, (f"no edge: the best line beside the dots has {best:.0%} support",))

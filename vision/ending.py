@@ -30,6 +30,8 @@ SEEN, UNSEEN = 1.28, -2.0  # log of how much likelier an outline is to show a st
 CLOSED, OPEN = 1.4, -1.6  # the same where a lane ends
 HOLE = -2.5  # of a missing dot inside the outline
 DOT_ROOM = 3.0  # px: a dot's centre may lie so far beyond the outline
+RIVAL = 25.0  # evidence within which the shapes are told apart by how well they fit
+APART_PX = 4.0  # so far apart lanes tell different things
 NARROWEST = 16.0  # px
 HIDDEN_PX = 9.0  # a step so far before the outline hides it
 SUMMITS = (0.0, -0.1, 0.1, -0.3, 0.3, -0.6, 0.6)  # of an outline, from the middle toward an edge
@@ -121,7 +123,6 @@ class Ending:
     shoulder: float
     share: float
     sigma_px: float
-    step: float
     evidence: float
     goes_on: float
 
@@ -202,7 +203,9 @@ def _best(
     shift = np.rint(DEPTHS * reach[:, None] / STEP).astype(np.int64)
     lead = int(shift.max()) + 1
     ahead = s[0] + STEP * np.arange(-lead, len(s))
-    k, top, evidence, share_top = likeliest(
+    count = len(LENGTHS)
+    places, evidences, closing = np.empty(count, np.int64), np.empty(count), np.empty(count)
+    likeliest(
         seen,
         shift,
         np.rint(reach / STEP).astype(np.int64),
@@ -215,22 +218,33 @@ def _best(
         CLOSED,
         OPEN,
         hole,
+        RIVAL,
+        places,
+        evidences,
+        closing,
     )
-    if k < 0:
+    best = float(evidences.max())
+    if not np.isfinite(best):
         return None
     end = np.array([border + 1e3])
     goes_on = float((low.until(end) + high.until(end))[0]) + hole * len(gone)
-    at = top - shift[k]
-    lanes_seen = (at >= 0) & (seen[np.arange(LANES), np.maximum(at, 0)] > 0.4)
-    station, scatter = float(s[top]), UNREFINED_PX
-    if lanes_seen.sum() >= LEAST_LANES:
-        farther, sigma = outline_through(size, at, top, lanes_seen, DEPTHS[k], float(reach[k]), STEP)
-        station, scatter = station + farther, float(np.hypot(0.5, sigma))
+    fits = []
+    for k in np.flatnonzero(evidences > best - RIVAL).tolist():
+        at = places[k] - shift[k]
+        lanes_seen = (at >= 0) & (seen[np.arange(LANES), np.maximum(at, 0)] > 0.4)
+        station, sigma, misfit = float(s[places[k]]), UNREFINED_PX, 0.0
+        if lanes_seen.sum() >= LEAST_LANES:
+            farther, spread, misfit = outline_through(
+                size, at, int(places[k]), lanes_seen, DEPTHS[k], float(reach[k]), STEP
+            )
+            station, sigma = station + farther, float(np.hypot(0.5, spread))
+        fits.append((float(evidences[k]) - misfit * min(1.0, wide / LANES / APART_PX), k, station, sigma))
+    evidence, k, station, sigma = max(fits)
     lane_share = float(SHARES[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
     lane = float(low.at(station) + lane_share * (high.at(station) - low.at(station)))
     outermost = station + skew * (lane_share - 0.5) * wide
-    step = float(np.median(size[np.arange(LANES), np.maximum(at, 0)][lanes_seen])) if lanes_seen.any() else 0.0
-    return Ending(toward, outermost, lane, float(s[top] - reach[k]), share_top, scatter, step, evidence, goes_on)
+    shoulder = float(s[places[k]] - reach[k])
+    return Ending(toward, outermost, lane, shoulder, float(closing[k]), sigma, evidence, goes_on)
 
 
 def _weight(wide: float) -> Array:

@@ -13,6 +13,7 @@ Floats = NDArray[Any]
 
 AROUND = 4  # places about an outline in which its steepest place is sought
 LEAST_SCATTER_PX = 0.7  # of the steepest places about their outline
+STRAY_PX = 1.5  # from a shape to the steps that are its outline
 LENGTH_HELD = 0.1  # of an outline's reach: what it may be off
 
 
@@ -30,22 +31,29 @@ def likeliest(
     closed: float,
     open_: float,
     hole: float,
-) -> tuple[int, int, float, float]:
-    """The best shape and place (shape, place, evidence, share of lanes that close); shape -1 where none fits.
+    near: float,
+    places: NDArray[np.int64],
+    evidence: Floats,
+    shares: Floats,
+) -> None:
+    """For each of k shapes its best place, the evidence for it and the share of lanes that close there; evidence is
+    -inf where none fits, and may be where it is farther than `near` below a better shape's.
 
     seen (lanes, m): how much of a step there is at each place. Of k shapes: shift (k, lanes) and reach (k,) in places
     below the outermost one, base (k,) evidence beforehand, weight (k,) of the lanes, first (k,) least place, holes
     (k, h) places beyond which each missing dot is inside. until (m + lead,): evidence of edges that go on
     to a place and no further, `lead` places ahead of seen's first. last: greatest place.
+    Written: places, evidence and shares (k,).
     """
     lanes, count = seen.shape
     lead = len(until) - count
-    best, best_shape, best_place, best_share = -np.inf, -1, -1, 0.0
+    best = -np.inf
     uncovered = np.zeros(count + 1, np.int64)  # holes that lie inside from each place on
     for k in range(len(reach)):
         uncovered[:] = 0
         for h in range(holes.shape[1]):
             uncovered[int(min(max(np.floor(holes[k, h]) + 1, 0), count))] += 1
+        evidence[k], places[k], shares[k] = -np.inf, -1, 0.0
         inside = 0
         for place in range(count):
             inside += uncovered[place]
@@ -55,7 +63,7 @@ def likeliest(
                 continue
             at_shoulder = min(max(place - reach[k] + lead, 0), len(until) - 1)
             total = base[k] + until[at_shoulder] + hole * inside
-            if total + weight[k] * closed <= best:
+            if total + weight[k] * closed <= max(best - near, evidence[k]):
                 continue
             share = 0.0
             for lane in range(lanes):
@@ -64,9 +72,9 @@ def likeliest(
                     share += seen[lane, at]
             share /= lanes
             total += weight[k] * (open_ + (closed - open_) * share)
-            if total > best:
-                best, best_shape, best_place, best_share = total, k, place, share
-    return best_shape, best_place, best, best_share
+            if total > evidence[k]:
+                evidence[k], places[k], shares[k] = total, place, share
+        best = max(best, evidence[k])
 
 
 @compiled
@@ -95,9 +103,10 @@ def _median(values: Floats) -> Any:
 @compiled
 def outline_through(
     size: Floats, at: NDArray[np.int64], top: int, seen: NDArray[np.bool_], shape: Floats, reach: float, step: float
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """How much farther out than place `top` the outermost point of an outline lies, and its standard deviation, in px,
-    from the steepest places near the outline; robust. Some lane has to be seen.
+    from the steepest places near the outline, and how ill the shape fits them (half the sum of squares, in units of
+    STRAY_PX); robust. Some lane has to be seen.
 
     size (lanes, m): steps, at places `step` px apart. Of each lane: at, the place of the outline, seen, whether a step
     is there, and shape, how far it lies below the outermost point, in reaches. reach: px.
@@ -139,4 +148,7 @@ def outline_through(
         determinant = a * d - b * b
         farther, longer = (d * x - b * y) / determinant, (a * y - b * x) / determinant
         variance = d / determinant
-    return farther, np.sqrt(3.0 * variance)
+    misfit = 0.0
+    for j in range(n):
+        misfit += 0.5 * min(((residual[j] - farther + depth[j] * longer) / STRAY_PX) ** 2, 9.0)
+    return farther, np.sqrt(3.0 * variance), misfit
