@@ -121,7 +121,7 @@ def go_on_from(perception: VisionLoop, knowledge: Knowledge, now_s: float, speed
         from vision.tracker import Kept
 
         tracked = knowledge.tracked
-        if np.shape(tracked.mean) != (SIZE,) or np.shape(tracked.covariance) != (SIZE, SIZE):
+        if {len(tracked.mean), len(tracked.covariance), *map(len, tracked.covariance)} != {SIZE}:
             return False  # of another version of this program
         later_s = now_s - age_s - knowledge.t
         lens = None if tracked.lens is None else np.array(tracked.lens)

@@ -43,7 +43,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.words[:1] == ["kill"]:
         number = int(options.words[1]) if len(options.words) > 1 else 100
-        return 1 if kills.campaign(number, options.seed, options.flight, options.record / "kills") else 0
+        speed = ["--speed", str(options.speed)] if options.speed else []
+        return 1 if kills.campaign(number, options.seed, options.flight, options.record / "kills", *speed) else 0
     extra = ["--lockstep"] if options.lockstep else []
     extra += ["--speed", str(options.speed)] if options.speed else []
     chosen = [f for f in FLIGHTS if not options.words or any(word in f.name for word in options.words)]

@@ -248,14 +248,14 @@ def _flown_twice(runs: Sequence[Path]) -> Iterator[str]:
                 yield f"{again:.1f} m of {side} twice"
 
 
-def campaign(number: int, seed: int, flight_s: float, record: Path) -> int:
+def campaign(number: int, seed: int, flight_s: float, record: Path, *given: str) -> int:
     """Fly them all; print a line each; return how many missed something."""
     missed = 0
     outcomes: dict[str, int] = {}
     mission = short_blade(record / "missions")
     for index, kill in enumerate(drawn(number, seed, flight_s)):
         began = time.monotonic()
-        verdict = fly(kill, mission, record / f"{seed}-{index:03d}")
+        verdict = fly(kill, mission, record / f"{seed}-{index:03d}", *given)
         missed += bool(verdict.missed)
         outcomes[verdict.outcome] = outcomes.get(verdict.outcome, 0) + 1
         how = (

@@ -94,6 +94,7 @@ def test_killed_twice_the_vehicle_is_found_flying_and_no_corner_is_flown_again(l
     kinds = [event["kind"] for run in (first, second, third) for event in vehicle_events(run)]
     assert kinds.count("takeoff") == 1 and kinds.count("parent_died") == 2
     assert "failsafe" in kinds, "between two programs it was left to its own failsafe"
+    assert "no report" not in said, said
     told: dict[str, Any] = json.loads((third / "summary.json").read_text())
     assert told["outcome"] == "completed" and told["continues"] == [first.name, second.name]
     note = note_in(third)
