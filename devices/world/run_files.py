@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from devices.blades_in_turn import BladesInTurn
 from devices.recorded_mission import states_of
 from devices.torn_files import csv_rows, json_lines
 from devices.world.settings import WorldSettings
@@ -43,7 +44,7 @@ class RunFiles:
             self,
             flight=replace(self.flight, t=self.flight.t + seconds),
             passes=tuple(Pass(one.start_s + seconds, one.end_s + seconds, one.side) for one in self.passes),
-            photographs=tuple(Photograph(one.stamp_s + seconds, one.side) for one in self.photographs),
+            photographs=tuple(replace(one, stamp_s=one.stamp_s + seconds) for one in self.photographs),
         )
 
     @classmethod
@@ -64,6 +65,7 @@ class RunFiles:
             path: state.get("with") or {} for path, state in states_of(document) if state.get("do") == "follow_edge"
         }
         journal = list(json_lines(folder / "journal.jsonl"))
+        turns = BladesInTurn.of(journal)
         wanted = [state.get("standoff_m") for state in follows.values()]
         standoff = [float(value) for value in wanted if isinstance(value, int | float)]
         return cls(
@@ -73,7 +75,7 @@ class RunFiles:
             np.array(document["rig"].get("mount_m", (0.0, 0.0, 0.0)), float),
             tuple(_passes(journal, follows, _flown_until(flight, reported))),
             tuple(
-                Photograph(float(line["stamp_s"]), str(line["side"]))
+                Photograph(float(line["stamp_s"]), str(line["side"]), turns.at(float(line["stamp_s"])))
                 for line in json_lines(folder / "frames" / "frames.jsonl")
                 if line.get("accepted") and (line.get("sharpness") or 0.0) >= SHARP
             ),

@@ -8,7 +8,7 @@ vehicle at 3 m/s can have been up to 4 mm nearer."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -71,10 +71,11 @@ class Pass:
 
 @dataclass(frozen=True)
 class Photograph:
-    """A recorded frame that counts: sharp and accepted."""
+    """A recorded frame that counts: sharp and accepted. blade: 0 for the first that was inspected, then clockwise."""
 
     stamp_s: float
     side: str
+    blade: int = 0
 
 
 def flight_truth(
@@ -90,7 +91,8 @@ def flight_truth(
     """The `truth` section of a run's summary; a number is None where the run has nothing to compute it from.
 
     min_clearance_m: over the armed flight. collision: the frame touched the turbine. standoff_*: over the passes, the
-    RMSE against `target_m`. tip_error_m: of the claimed radius. coverage: see `coverage`.
+    RMSE against `target_m`. tip_error_m: of the claimed radius. coverage: see `coverage`, of all
+    blades of which there are photographs, and of each where there are several.
     """
     armed = flight.position[flight.armed]
     nearest = float(distances(shape.mesh, armed).min()) if len(armed) else None
@@ -98,6 +100,11 @@ def flight_truth(
     standoff = _standoff(flight, shape, lens, passes)
     error = standoff - target_m if target_m is not None and len(standoff) else None
     sides = sorted({one.side for one in passes} | {one.side for one in photographs})
+    blades = []
+    for number in range(1 + max((one.blade for one in photographs), default=0)):
+        turned = replace(shape, azimuth_deg=shape.azimuth_deg + 120.0 * number)
+        own = [one for one in photographs if one.blade == number]
+        blades.append({side: coverage(flight, turned, camera, mount, own, side) for side in sides})
     return {
         "min_clearance_m": nearest,
         "collision": nearest is not None and nearest < COLLISION_M,
@@ -105,7 +112,8 @@ def flight_truth(
         "standoff_min_m": float(standoff.min()) if len(standoff) else None,
         "standoff_max_m": float(standoff.max()) if len(standoff) else None,
         "tip_error_m": None if tip_radius_m is None else abs(tip_radius_m - shape.blade.tip_radius_m),
-        "coverage": {side: coverage(flight, shape, camera, mount, photographs, side) for side in sides},
+        "coverage": {side: sum(blade[side] for blade in blades) / len(blades) for side in sides},
+        **({"blades": [{"coverage": blade} for blade in blades]} if len(blades) > 1 else {}),
     }
 
 

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from devices.torn_files import LARGEST
+
 FORMAT = 1  # of the journal, as its first line says
 _encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False).encode
+_NAMES = {"event": ("event",), "transition": ("event", "key", "to")}
 SLOWEST_DISK_S = 1.0  # a disk that takes longer must not hold up the flight
 
 
@@ -133,6 +136,8 @@ def read_journal(path: Path) -> tuple[Entry, ...]:
         JournalError: the file is missing, is not a journal, or is damaged before its last line.
     """
     try:
+        if path.exists() and (not path.is_file() or path.stat().st_size > LARGEST):
+            raise JournalError(f"{path}: not a journal: a plain file of at most {LARGEST // 1_000_000} MB is expected")
         lines = path.read_bytes().split(b"\n")
     except OSError as error:
         raise JournalError(f"{path}: {error.strerror}; name the folder of a run that has a journal.jsonl") from None
@@ -189,9 +194,11 @@ def _opened(path: Path, sync: bool) -> Any:
 def _parsed(line: bytes) -> Entry | None:
     try:
         fields = json.loads(line)
-        return Entry(int(fields.pop("seq")), float(fields.pop("t")), str(fields.pop("kind")), fields)
-    except (ValueError, KeyError, TypeError, AttributeError):
+        entry = Entry(int(fields.pop("seq")), float(fields.pop("t")), str(fields.pop("kind")), fields)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
+    told = all(isinstance(fields.get(name), str) for name in _NAMES.get(entry.kind, ()))
+    return entry if told and math.isfinite(entry.t) else None
 
 
 def _plain(value: Any) -> Any:

@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from devices.blades_in_turn import BladesInTurn
 from devices.recorded_mission import states_of
 from devices.torn_files import csv_rows, json_lines
 from mission.record.folder import RunFolder
@@ -78,13 +79,21 @@ class RunHistory:
 
     @cached_property
     def frames(self) -> Sequence[Line]:
-        """Every recorded photograph whose file is there; `path` is where, seen from this run's folder."""
+        """Every recorded photograph whose file is there; `path` is where, seen from this folder; and its `blade`."""
         return [
-            {**line, "path": _path(part, self.folder, str(line["file"]))}
-            for part in self.parts
+            {**line, "path": _path(part, self.folder, str(line["file"])), "blade": turn.at(line.get("stamp_s") or 0.0)}
+            for part, turn in zip(self.parts, self.turns, strict=True)
             for line in json_lines(part.frames / "frames.jsonl")
             if "file" in line and "side" in line
         ]
+
+    @cached_property
+    def turns(self) -> Sequence[BladesInTurn]:
+        """Which blade it was when, for each part."""
+        turns: list[BladesInTurn] = []
+        for journal in self.journals:
+            turns.append(BladesInTurn.of(journal, turns[-1].last if turns else 0))
+        return turns
 
     @cached_property
     def telemetry(self) -> Sequence[Mapping[str, str]]:

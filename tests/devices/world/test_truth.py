@@ -97,6 +97,16 @@ def test_photographs_all_along_an_edge_cover_it_and_half_of_them_half(shape):
     assert half == pytest.approx(0.5, abs=0.06)
 
 
+def test_the_second_blade_is_covered_by_its_own_photographs_alone(shape):
+    flight = along_the_blade(shape, np.arange(1.5, 40.5, 0.5), 3.2, sideways=0.6)
+    before = replace(shape, azimuth_deg=shape.azimuth_deg - 120.0)  # then the one that is photographed comes second
+    frames = [Photograph(t, "leading", blade=1) for t in flight.t]
+    truth = flight_truth(flight, before, CAMERA, MOUNT, photographs=frames)
+    assert [blade["coverage"]["leading"] > 0.98 for blade in truth["blades"]] == [False, True]
+    assert truth["coverage"]["leading"] == pytest.approx(0.5, abs=0.1)
+    assert "blades" not in flight_truth(flight, shape, CAMERA, MOUNT, photographs=[replace(f, blade=0) for f in frames])
+
+
 def test_an_edge_outside_the_picture_or_of_the_other_side_is_not_covered(shape):
     stations = np.arange(6.0, 14.0, 0.5)  # the blade is wider than the picture here
     flight = along_the_blade(shape, stations, 3.2, sideways=0.9)
