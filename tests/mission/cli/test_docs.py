@@ -11,7 +11,7 @@ from devices.world.settings import Faults
 from mission.cli.main import commands
 from tests.mission.cli.program import ROOT
 
-NAMES = ("README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/faults.md", "docs/resume.md")
+NAMES = ("README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/eye.md", "docs/faults.md", "docs/resume.md")
 DOCUMENTS = [ROOT / name for name in NAMES]
 
 
