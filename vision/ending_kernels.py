@@ -96,8 +96,15 @@ def summits_over(
 
 @compiled
 def _median(values: Floats) -> Any:
-    ordered = np.sort(values)
-    return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+    """Median of a few values; they are put in order."""
+    count = len(values)
+    for k in range(1, count):
+        value, place = values[k], k
+        while place > 0 and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
+    return 0.5 * (values[(count - 1) // 2] + values[count // 2])
 
 
 @compiled
@@ -132,10 +139,13 @@ def outline_through(
         n += 1
     residual, depth = residual[:n], depth[:n]
     # Outermost point and length of the outline together; the length is held to the shape's own.
-    farther, longer, variance = _median(residual), 0.0, 0.0
+    sizes = residual.copy()
+    farther, longer, variance = _median(sizes), 0.0, 0.0
     held = 1.0 / max(LENGTH_HELD * reach, 0.1) ** 2
     for _ in range(4):
-        scatter = max(LEAST_SCATTER_PX, 1.4826 * _median(np.abs(residual - farther + depth * longer)))
+        for j in range(n):
+            sizes[j] = abs(residual[j] - farther + depth[j] * longer)
+        scatter = max(LEAST_SCATTER_PX, 1.4826 * _median(sizes))
         a, b, d, x, y = 1e-6, 0.0, held, 0.0, 0.0
         for j in range(n):
             off = (residual[j] - farther + depth[j] * longer) / (2.0 * scatter)

@@ -14,6 +14,19 @@ Flags = NDArray[np.bool_]
 
 
 @compiled
+def _median(values: Floats) -> Any:
+    """Median of a few values; they are put in order."""
+    count = len(values)
+    for k in range(1, count):
+        value, place = values[k], k
+        while place > 0 and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
+    return 0.5 * (values[(count - 1) // 2] + values[count // 2])
+
+
+@compiled
 def median_steps(step: Floats, agrees: Flags, within: Flags, median: Floats) -> None:
     """Median (k,) of |step| (k, m) at the places that agree and lie within (k, m); zero where there is none."""
     lines, places = step.shape
@@ -26,8 +39,7 @@ def median_steps(step: Floats, agrees: Flags, within: Flags, median: Floats) -> 
                 count += 1
         median[line] = 0.0
         if count > 0:
-            ordered = np.sort(sizes[:count])
-            median[line] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
+            median[line] = _median(sizes[:count])
 
 
 @compiled
@@ -110,8 +122,7 @@ def missing_dots(
         nx, ny = normal[line, 0], normal[line, 1]
         for k in range(len(dots)):
             depth[k] = dots[k, 0] * nx + dots[k, 1] * ny - rho[line]
-        ordered = np.sort(depth)
-        innermost = 0.5 * (ordered[(len(dots) - 1) // 2] + ordered[len(dots) // 2])
+        innermost = _median(depth)  # which leaves the depths in order
         there, gone, past = 0, 0, 0
         for k in range(len(dots)):
             there += depth[k] > innermost
