@@ -26,7 +26,7 @@ REGISTRATION_PX = 0.12  # how far laser-off and laser-on images may lie apart af
 LEAST_VARIANCE = 0.1  # grey levels², of rounding
 SIGNIFICANT = 3.0  # standard deviations of a spot's level
 LONE = 1.5  # times as uncertain is a spot's place where what lies under it is guessed from around it
-WORST_PX = 0.5  # a standard deviation from which a place is none
+WORST_PX = 0.35  # a standard deviation from which a place is none
 APART_PX = 4.0  # nearer to a stronger one a spot is part of it
 
 

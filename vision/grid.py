@@ -30,6 +30,7 @@ LEAST_MISFIT = 0.01  # of the grid's spacing, by which the best calibrated dot i
 NEIGHBOURS = 2  # rows and columns over which a surface holds together
 RELIEF = 0.055  # relative change of inverse depth from one dot to the next on one surface
 LEAST_SURFACE = 4
+SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade
 AMBIGUOUS = 0.6  # support of another reading, over that of the best, from which neither is believed
 MOST_PAIRS = 64  # that one spot may be part of
 
@@ -188,3 +189,15 @@ def _like_the_rest(matches: Matches) -> NDArray[np.bool_]:
         return np.ones(0, bool)
     usual = np.array([np.median(matches.misfit[matches.surface == k]) for k in range(matches.surface.max() + 1)])
     return np.asarray(matches.misfit < 4 * usual[matches.surface] + GRID_SIGMA)
+
+
+def nearest_surface(matches: Matches, least: int) -> Matches:
+    """The matches of the nearest surface that has `least` dots and enough of all of them."""
+    if len(matches) == 0:
+        return matches
+    count = np.bincount(matches.surface)
+    depth = np.array([np.median(matches.inverse_depth[matches.surface == k]) for k in range(len(count))])
+    enough = count >= max(least, SURFACE_SHARE * count.max())
+    if not enough.any():
+        return matches.take(matches.surface == 0)
+    return matches.take(matches.surface == int(np.argmax(np.where(enough, depth, 0))))

@@ -16,7 +16,7 @@ from vision.dots import Spots, find_spots
 from vision.edges import edge_of, find_edges
 from vision.evidence import Blade, OtherEye, texture_between
 from vision.explained import absent_dots, explained_dots
-from vision.grid import Matches, match_eyes, match_laser, reachable
+from vision.grid import Matches, match_eyes, match_laser, nearest_surface, reachable
 from vision.lines import smoothed
 from vision.mosaic import demosaiced
 from vision.observation import BladeObservation, Dots
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 LEAST_DOTS = 4
 LEAST_OTHER = 6  # dots off the fitted surface: fewer are mistakes, as many may be another surface
-SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade
+WORST_DISTANCE = 0.033  # standard deviation over distance, from which it may be a tenth off
 
 
 class Eye:
@@ -90,7 +90,7 @@ class Eye:
         watch.lap("match")
         if ambiguous:
             return self._refused(frames, watch, "the dots can be read in two ways that contradict each other")
-        blade = _blade_of(matches)
+        blade = nearest_surface(matches, LEAST_DOTS)
         if len(blade) < LEAST_DOTS:
             return self._refused(
                 frames, watch, f"{len(left)} spots in the left image, {len(blade)} of them dots on a blade"
@@ -98,6 +98,9 @@ class Eye:
         surface = fit_surface(rays[blade.left], blade.inverse_depth, blade.sigma)
         if surface is None:
             return self._refused(frames, watch, f"{len(blade)} dots that make no surface before the camera")
+        unsure = float(np.sqrt(surface.covariance[0, 0])) / surface.depth_m
+        if unsure > WORST_DISTANCE:
+            return self._refused(frames, watch, f"{len(blade)} dots give the distance only to {unsure:.0%}")
         if 0 < np.count_nonzero(~surface.inliers) < LEAST_OTHER:
             matches = _without(matches, blade.take(~surface.inliers))
         blade = blade.take(surface.inliers)
@@ -212,18 +215,6 @@ def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now |
 
 def _green_of(images: Mapping[str, Image], name: str) -> Image | None:
     return green(images[name]) if name in images else None
-
-
-def _blade_of(matches: Matches) -> Matches:
-    """The nearest surface that has enough of the dots."""
-    if len(matches) == 0:
-        return matches
-    count = np.bincount(matches.surface)
-    depth = np.array([np.median(matches.inverse_depth[matches.surface == k]) for k in range(len(count))])
-    enough = count >= max(LEAST_DOTS, SURFACE_SHARE * count.max())
-    if not enough.any():
-        return matches.take(matches.surface == 0)
-    return matches.take(matches.surface == int(np.argmax(np.where(enough, depth, 0))))
 
 
 def _without(matches: Matches, others: Matches) -> Matches:
