@@ -1,9 +1,7 @@
-"""Kills the program at random instants of a flight beside a blade, goes on with `--resume`, and judges what became of
-the inspection by its journals, its photographs and the truth."""
+"""Kills the program at random instants of a flight beside a blade, and goes on with `--resume`."""
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import random
@@ -12,18 +10,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from devices.torn_files import csv_rows, json_lines
 from devices.vehicle.handover import note_in
-from mission.executive.journal import JournalError, read_journal
-from mission.executive.replay import replay
-from mission.language.document import load
+from tests.campaign.verdict import Verdict, journal_of, judge, runs_in, state_of
 
 ROOT = Path(__file__).parents[2]
 SHORT_BLADE = """\
@@ -37,8 +30,6 @@ states:
     states:
       survey: {with: {pictures: 1}}
 """
-CLEARANCE_M = 2.0
-AGAIN_M = 4.0  # of a pass that went on: its overlap, and the stretch that a picture shows
 PATIENCE_S = 300.0
 
 
@@ -51,16 +42,6 @@ class Kill:
     power: bool = False
     dead_s: float = 1.0
     torn: int = 0
-
-
-@dataclass
-class Verdict:
-    """What became of it. states: where each program was killed. missed: what should not have happened."""
-
-    outcome: str = ""
-    states: list[str] = field(default_factory=list)
-    clearance_m: float | None = None
-    missed: list[str] = field(default_factory=list)
 
 
 def drawn(number: int, seed: int, flight_s: float) -> Iterator[Kill]:
@@ -97,16 +78,16 @@ def fly(kill: Kill, mission: Path, logs: Path, *given: str) -> Verdict:
         for after_s in kill.after_s:
             if _killed(command(logs, *options), after_s, logs) is not None:
                 break
-            verdict.states.append(_state(logs))
+            verdict.states.append(state_of(logs))
             if kill.power:
                 _end_vehicles(logs)
             _tear(logs, kill.torn)
             time.sleep(kill.dead_s)
-            options = ["--resume", "latest"] if _runs(logs) else begin
+            options = ["--resume", "latest"] if runs_in(logs) else begin
         if not _ended(logs):
             code = _killed(command(logs, *options), PATIENCE_S, logs)
             verdict.missed += [] if code in (0, 1) else [f"exit {code}"]
-        _judge(logs, verdict)
+        judge(logs, verdict)
     finally:
         _end_vehicles(logs)
     return verdict
@@ -125,32 +106,13 @@ def _killed(words: list[str], after_s: float, logs: Path) -> int | None:
         process.wait()
 
 
-def _runs(logs: Path) -> list[Path]:
-    return sorted(path.parent for path in logs.glob("*/mission.yaml"))
-
-
-def _journal(run: Path) -> list[Mapping[str, Any]]:
-    return list(json_lines(run / "journal.jsonl"))
-
-
-def _state(logs: Path) -> str:
-    """The last settled state of all runs."""
-    for run in reversed(_runs(logs)):
-        entered = [
-            line.get("to") or line.get("state") for line in _journal(run) if line["kind"] in ("start", "transition")
-        ]
-        if entered:
-            return str(entered[-1])
-    return "-"
-
-
 def _ended(logs: Path) -> bool:
-    runs = _runs(logs)
-    return bool(runs) and any(line["kind"] == "end" for line in _journal(runs[-1]))
+    runs = runs_in(logs)
+    return bool(runs) and any(line["kind"] == "end" for line in journal_of(runs[-1]))
 
 
 def _end_vehicles(logs: Path) -> None:
-    for run in _runs(logs):
+    for run in runs_in(logs):
         note = note_in(run)
         if note is not None and b"devices.vehicle" in _command_line(note.pid):
             with suppress(ProcessLookupError):
@@ -166,7 +128,7 @@ def _command_line(pid: int) -> bytes:
 
 def _tear(logs: Path, torn: int) -> None:
     """As a power failure may leave the last line, which had not yet taken effect."""
-    runs = _runs(logs)
+    runs = runs_in(logs)
     path = runs[-1] / "journal.jsonl" if runs else None
     if not torn or path is None or not path.exists():
         return
@@ -174,78 +136,6 @@ def _tear(logs: Path, torn: int) -> None:
     last = content[:-1].rfind(b"\n") + 1
     if b'"kind": "transition"' not in content[last:] and last:
         path.write_bytes(content[: max(last, len(content) - torn)])
-
-
-def _judge(logs: Path, verdict: Verdict) -> None:
-    from mission.cli.report import rebuild
-    from mission.record.folder import RunFolder
-
-    text = (logs / "output.txt").read_text()
-    if "Traceback" in text or "unexpected error" in text:
-        verdict.missed.append("a traceback")
-    runs = _runs(logs)
-    last = runs[-1]
-    ends = [line for line in _journal(last) if line["kind"] == "end"]
-    verdict.outcome = str(ends[-1]["outcome"]) if ends else "unfinished"
-    if verdict.outcome not in ("completed", "aborted"):
-        verdict.missed.append(f"{verdict.outcome} in {_state(logs)}")
-    for run in runs:
-        verdict.missed += [f"{run.name}: {text}" for text in _unreadable(run)]
-    rows = csv_rows(last / "telemetry" / "truth.csv")
-    if rows and (rows[-1]["armed"] != "0" or abs(float(rows[-1]["d"])) > 1.0):
-        verdict.missed.append(f"left at {-float(rows[-1]['d']):.1f} m, armed {rows[-1]['armed']}")
-    verdict.missed += _flown_twice(runs)
-    truth = rebuild(RunFolder(last)).get("truth") or {}
-    verdict.clearance_m = truth.get("min_clearance_m")
-    if verdict.clearance_m is not None and verdict.clearance_m < CLEARANCE_M:
-        verdict.missed.append(f"clearance {verdict.clearance_m:.2f} m")
-
-
-def _unreadable(run: Path) -> Iterator[str]:
-    path = run / "journal.jsonl"
-    if not path.exists():
-        return
-    try:
-        read_journal(path)
-        mission = load(run / "mission.yaml")
-    except (JournalError, ValueError) as error:
-        yield str(error)
-        return
-
-    async def differences() -> list[str]:
-        return [str(played.difference) for played in [one async for one in replay(path, mission)] if played.difference]
-
-    yield from asyncio.run(differences())
-
-
-def _flown_twice(runs: Sequence[Path]) -> Iterator[str]:
-    """Passes that were entered after they had been journalled as done, and photographs taken of the same stretch by
-    two programs beyond the overlap."""
-    done: set[str] = set()
-    for run in runs:
-        for line in _journal(run):
-            state = line.get("to") if line["kind"] == "transition" else line.get("state")
-            if line["kind"] in ("transition", "start"):
-                side = str(state).rpartition(".")[2]
-                if side in done:
-                    yield f"{side} flown again after it was done"
-            memory = line.get("memory") or (line if line["kind"] == "memory" else {})
-            done = set(memory.get("passes_done", done))
-    stretches: dict[str, list[tuple[float, float]]] = {}
-    for run in runs:
-        for side in ("leading", "trailing"):
-            at = [
-                float(line["station_m"])
-                for line in json_lines(run / "frames" / "frames.jsonl")
-                if line.get("side") == side and line.get("station_m") is not None
-            ]
-            if at:
-                stretches.setdefault(side, []).append((min(at), max(at)))
-    for side, found in stretches.items():
-        for (low, high), (other_low, other_high) in pairwise(found):
-            again = min(high, other_high) - max(low, other_low)
-            if again > AGAIN_M:
-                yield f"{again:.1f} m of {side} twice"
 
 
 def campaign(number: int, seed: int, flight_s: float, record: Path, *given: str) -> int:
