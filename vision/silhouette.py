@@ -28,6 +28,7 @@ LEAST_SHARE, LEAST_SECOND = 0.6, 0.5  # of an edge alone, and of one beside a be
 SAME_PX, SAME_TURN = 14.0, np.deg2rad(5)  # between lines of which one is the other's shoulder
 USUAL_TAPER, LARGEST_TAPER = np.deg2rad(16), np.deg2rad(32)
 ACROSS = np.deg2rad(40)  # by which a tip may lie askew
+PAST_TIP = 30.0  # px: further past the tip no edge is seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,19 +196,27 @@ def _chosen(sides: list[Side]) -> Silhouette:
     worthiest: tuple[float, tuple[Side, ...]] = (alone[0].value - 0.35, (alone[0],))
     for n, one in enumerate(good):
         for two in good[n + 1 :]:
-            if float(-one.outward @ two.outward) > np.cos(LARGEST_TAPER) and max(one.share, two.share) >= LEAST_SHARE:
-                taper = float(np.arccos(np.clip(-one.outward @ two.outward, -1, 1)))
-                worth = (one.value + two.value) / 2 + 0.1 - 0.3 * max(taper / USUAL_TAPER - 1, 0)
-                if worth > worthiest[0]:
-                    worthiest = (worth, (one, two))
+            taper = float(np.arccos(np.clip(-one.outward @ two.outward, -1, 1)))
+            if taper > LARGEST_TAPER or max(one.share, two.share) < LEAST_SHARE:
+                continue
+            if taper > USUAL_TAPER and _tip(sides, (one, two), _axis((one, two))) is None:
+                continue
+            worth = (one.value + two.value) / 2 + 0.1 - 0.3 * max(taper / USUAL_TAPER - 1, 0)
+            if worth > worthiest[0]:
+                worthiest = (worth, (one, two))
     edges = worthiest[1]
-    turns = np.array([np.arctan2(side.outward[1], side.outward[0]) + np.pi / 2 for side in edges])
-    axis = float(0.5 * np.angle(np.exp(2j * turns).sum()) % np.pi)
+    axis = _axis(edges)
     return Silhouette(edges, _tip(sides, edges, axis), axis, ())
 
 
+def _axis(edges: tuple[Side, ...]) -> float:
+    """The mean direction of edges (5.14), modulo π."""
+    turns = np.array([np.arctan2(side.outward[1], side.outward[0]) + np.pi / 2 for side in edges])
+    return float(0.5 * np.angle(np.exp(2j * turns).sum()) % np.pi)
+
+
 def _tip(sides: list[Side], edges: tuple[Side, ...], axis: float) -> Side | None:
-    """The piece of outline across the axis, which closes the blade between its edges."""
+    """The piece of outline across the axis that closes the blade: its edges end there."""
     toward = np.array([np.cos(axis), np.sin(axis)])
     across = [
         side
@@ -216,5 +225,12 @@ def _tip(sides: list[Side], edges: tuple[Side, ...], axis: float) -> Side | None
         and side.empty < 0.25
         and abs(float(side.outward @ toward)) > np.cos(ACROSS)
         and side not in edges
+        and all(_ends_at(edge, side) for edge in edges)
     ]
     return max(across, key=lambda side: side.value, default=None)
+
+
+def _ends_at(edge: Side, tip: Side) -> bool:
+    """Whether an edge is not seen to go on beyond a tip."""
+    ends = edge.outward * edge.rho + np.array(edge.ends)[:, None] * edge.direction
+    return float((ends @ tip.outward).max()) < tip.rho + PAST_TIP
