@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vision.camera import Camera, RigGeometry
 from vision.capture import Image, StereoFrames
 from vision.grid import expected_points
+from vision.mosaic import RED_AT
 from vision.observation import BladeObservation
 from vision.pipeline import Eye
 
@@ -28,8 +29,8 @@ def warm_up(eye: Eye) -> BladeObservation:
 
 
 def specimen(geometry: RigGeometry, factor: int = 1) -> StereoFrames:
-    """Four images (h, w, 3) of an upright blade that ends in view, square before the left camera, as the rig's cameras
-    would see it; drawn at 1 / factor of their size."""
+    """Four images (h, w, 3), or (h, w) raw mosaics where the rig delivers those, of an upright blade that ends in view,
+    square before the left camera, as the rig's cameras would see it; drawn at 1 / factor of their size."""
     stereo, laser = geometry.stereo.shrunk(factor), geometry.laser
     dots = np.empty((0, 3))
     middle, reach = np.zeros(2), np.full(2, 0.25 * DISTANCE_M)
@@ -55,7 +56,7 @@ def specimen(geometry: RigGeometry, factor: int = 1) -> StereoFrames:
         points = lens + rays * ((DISTANCE_M - lens[0]) / rays[:, :1])
         plain = np.where(on_blade(points), BLADE, BACKGROUND).reshape(camera.height, camera.width)
         lit = plain + DOT * _spots(camera, dots @ rotation.T + translation)
-        images += [_enlarged(plain, plain, factor, full), _enlarged(plain, lit, factor, full)]
+        images += [_taken(plain, plain, factor, full, geometry), _taken(plain, lit, factor, full, geometry)]
     return StereoFrames(0.0, images[0], images[2], images[1], images[3])
 
 
@@ -71,9 +72,16 @@ def _spots(camera: Camera, dots: Array) -> Array:
     return light
 
 
-def _enlarged(grey: Array, green: Array, factor: int, camera: Camera) -> Image:
-    """A BGR image of the camera's size, each pixel repeated, the last ones to the border."""
+def _taken(grey: Array, green: Array, factor: int, camera: Camera, geometry: RigGeometry) -> Image:
+    """An image as the rig's camera delivers it, each pixel repeated, the last ones to the border."""
     image = np.stack([grey, green, grey], axis=2).clip(0, 255).astype(np.uint8)
     image = image.repeat(factor, axis=0).repeat(factor, axis=1)
     missing = ((0, camera.height - image.shape[0]), (0, camera.width - image.shape[1]), (0, 0))
-    return np.ascontiguousarray(np.pad(image, missing, mode="edge"))
+    image = np.ascontiguousarray(np.pad(image, missing, mode="edge"))
+    if geometry.bayer is None:
+        return image
+    row, column = RED_AT[geometry.bayer]
+    raw = image[..., 0].copy()
+    for v, u in ((row, 1 - column), (1 - row, column)):
+        raw[v::2, u::2] = image[v::2, u::2, 1]
+    return raw

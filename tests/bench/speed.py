@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -34,8 +34,9 @@ def measure(now: Callable[[], float], scenes: int = 12, repeats: int = 5) -> lis
         _of(f"612 × 512 {name}", now, (_scene(seed, colour, 1) for seed in range(scenes)), repeats, ASKED_MS)
         for name, colour in (("grey", False), ("colour", True))
     ]
-    full = _of("2448 × 2048 colour", now, (_scene(seed, True, 4) for seed in range(3)), repeats, ASKED_FLOORS)
-    return [*small, full]
+    large = [_scene(seed, True, 4) for seed in range(3)]
+    full = _of("2448 × 2048 colour", now, large, repeats, ASKED_FLOORS)
+    return [*small, full, _of("2448 × 2048 Bayer", now, map(_raw, large), repeats, ASKED_BAYER_FLOORS)]
 
 
 def table(speeds: Sequence[Speed], clock: str) -> list[str]:
@@ -58,6 +59,23 @@ def _scene(seed: int, colour: bool, scale: int) -> Scene:
     return draw_scene(random_settings(9000 + seed, colour=colour, scale=scale))
 
 
+def _raw(scene: Scene) -> Scene:
+    """The scene as colour cameras deliver it before anything is interpolated: one colour a pixel, red first."""
+    frames = scene.frames
+    left, right, left_laser, right_laser = (
+        None if image is None else _mosaic(image)
+        for image in (frames.left, frames.right, frames.left_laser, frames.right_laser)
+    )
+    raw = replace(frames, left=left, right=right, left_laser=left_laser, right_laser=right_laser)
+    return replace(scene, frames=raw, geometry=replace(scene.geometry, bayer="rggb"))
+
+
+def _mosaic(image: Image) -> Image:
+    raw = image[..., 1].copy()
+    raw[0::2, 0::2], raw[1::2, 1::2] = image[0::2, 0::2, 2], image[1::2, 1::2, 0]
+    return raw
+
+
 def _of(name: str, now: Callable[[], float], scenes: Iterable[Scene], repeats: int, asked: float) -> Speed:
     laps: dict[str, list[float]] = {stage: [] for stage in STAGES}
     floors: list[float] = []
@@ -75,9 +93,10 @@ def _of(name: str, now: Callable[[], float], scenes: Iterable[Scene], repeats: i
 
 
 def _floor_ms(scene: Scene, now: Callable[[], float]) -> float:
-    """Two INTER_AREA halvings and grey of the four full colour images."""
+    """Two INTER_AREA halvings and grey of four colour images of this size."""
     frames = scene.frames
     images = [i for i in (frames.left, frames.right, frames.left_laser, frames.right_laser) if i is not None]
+    images = [cv2.cvtColor(i, cv2.COLOR_GRAY2BGR) if i.ndim == 2 else i for i in images]
     started = now()
     for image in images:
         _floor(image)

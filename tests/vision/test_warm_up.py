@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vision.camera import Camera, LaserGrid, RigGeometry, StereoPair
 from vision.pipeline import Eye
-from vision.warm_up import DISTANCE_M, warm_up
+from vision.warm_up import DISTANCE_M, specimen, warm_up
 
 
 def rig(width: int, height: int, baseline_m: float, distortion: tuple[float, float, float, float]) -> RigGeometry:
@@ -28,6 +30,14 @@ def test_an_eye_sees_distance_edges_and_tip_of_the_specimen(geometry: RigGeometr
     seen = warm_up(Eye(geometry))
     assert seen.valid and seen.distance_m == pytest.approx(DISTANCE_M, rel=0.01)
     assert len(seen.edges) == 2 and seen.tip is not None and seen.chord_m is not None
+
+
+def test_raw_mosaics_are_drawn_for_a_rig_that_delivers_them() -> None:
+    geometry = replace(rig(2448, 2048, 0.2, (0.0, 0.0, 0.0, 0.0)), bayer="gbrg")
+    frames = specimen(geometry, 4)
+    assert frames.left_laser is not None and frames.left_laser.shape == (2048, 2448)
+    seen = warm_up(Eye(geometry))
+    assert len(seen.edges) == 2 and seen.distance_m == pytest.approx(DISTANCE_M, rel=0.01)
 
 
 def test_an_eye_without_a_laser_says_so() -> None:
