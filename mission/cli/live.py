@@ -199,10 +199,10 @@ class LiveView(_Watcher):
 
     def _obey(self, executive: Executive, command: str) -> None:
         """On the executive's loop, as a command from another shell would be followed."""
-        from mission.executive.operator import obey
+        from mission.executive.operator import at_the_keyboard, obey
 
         at = datetime.now(UTC).isoformat(timespec="milliseconds")
-        self._said = (time.monotonic(), obey(executive, {"command": command}, "keyboard", at).text)
+        self._said = (time.monotonic(), obey(executive, {"command": command}, at_the_keyboard(), at).text)
 
     def _settle(self, yes: bool) -> None:
         self._question = None

@@ -75,6 +75,10 @@ def _measured(summary: Mapping[str, Any]) -> list[str]:
         )
     if summary["coverage"]:
         shares = ", ".join(f"{side} {100 * share:.0f} %" for side, share in summary["coverage"].items())
+        if "blades" in summary:
+            sides = [[f"{100 * share:.0f}" for share in one["coverage"].values()] for one in summary["blades"]]
+            each = ", ".join(" and ".join(side) or "nothing" for side in sides)
+            shares += f" (blade by blade {each} %)"
         lines.append(f"  coverage  {shares}, {summary['frames']} frames")
     if summary["tip"]["found"]:
         error = f", {truth['tip_error_m']:.2f} m off in truth" if truth.get("tip_error_m") is not None else ""

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from mission.behaviours.behaviour import behaviours
@@ -21,6 +22,7 @@ from mission.executive.gate import Gate, guard_services
 from mission.executive.helm import PULSE_S, Helm
 from mission.executive.journal import SLOWEST_DISK_S, Journal
 from mission.executive.machine import Machine
+from mission.executive.operator import at_the_keyboard
 from mission.executive.question import Ask, Question, Questions
 from mission.executive.queue import EventQueue, Queued
 from mission.executive.silence import Silence
@@ -236,7 +238,8 @@ class Conductor:
             self._queue.put("behaviour_stuck", {"state": self.state})
 
     def _answered(self, yes: bool) -> None:
-        self.note("confirm" if yes else "refuse", "operator")
+        at = datetime.now(UTC).isoformat(timespec="milliseconds")
+        self.note("confirm" if yes else "refuse", at_the_keyboard(), at=at)
         self.confirm(yes)
 
     def _behaviour_ended(self, activation: int, name: str, data: dict[str, Any]) -> None:

@@ -174,6 +174,11 @@ def _peer(connection: Any) -> str | None:
     return _name(uid) if uid in (os.getuid(), 0) else None
 
 
+def at_the_keyboard() -> str:
+    """Who presses keys in the terminal that flies."""
+    return f"{_name(os.getuid())} (keyboard)"
+
+
 def _name(uid: int) -> str:
     try:
         return pwd.getpwuid(uid).pw_name
