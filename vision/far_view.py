@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 WORKING_PX = 800  # pictures wider than this are halved
 MODEL_HUB_PX = 1.0  # what equal straight edges leave out: foreshortening, twist, bend
 MODEL_DIRECTION = np.deg2rad(0.4)
+ASIDE_HUB_PX, ASIDE_DIRECTION = 6.0, np.deg2rad(3.0)  # times the sine of the yaw: twist shows from aside
 LEAST_SUPPORT = 0.5  # of the better edge of each blade
 LEAST_SEEN, LEAST_AGREEMENT = 0.72, 0.55  # of all edges, after and before the last fraction of a pixel
 MOST_FITS = 4
@@ -78,13 +79,18 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None, n
     hub_off = max((float(np.linalg.norm(fit.parameters[:2] - best.parameters[:2])) for fit in equals), default=0.0)
     turn_off = max((_turned(fit, best) for fit in equals), default=0.0)
     turn = np.argsort(directions)
+    aside = float(np.sin(abs(best.parameters[3])))
+    model_hub, model_direction = (
+        np.hypot(MODEL_HUB_PX, aside * ASIDE_HUB_PX),
+        np.hypot(MODEL_DIRECTION, aside * ASIDE_DIRECTION),
+    )
     return FarView(
         True,
         (),
         hub * factor,
-        float(np.hypot(np.hypot(best.hub_sigma_px, MODEL_HUB_PX), hub_off / 2)) * factor,
+        float(np.hypot(np.hypot(best.hub_sigma_px, model_hub), hub_off / 2)) * factor,
         directions[turn],
-        np.hypot(np.hypot(best.direction_sigma, MODEL_DIRECTION), turn_off / 2)[turn],
+        np.hypot(np.hypot(best.direction_sigma, model_direction), turn_off / 2)[turn],
         elapsed,
     )
 

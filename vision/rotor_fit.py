@@ -114,12 +114,23 @@ def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
         parameters,
         float(np.sqrt((covariance[0, 0] + covariance[1, 1]) / 2)),
         here,
-        np.full(3, np.sqrt(covariance[2, 2])),
+        _direction_sigma(parameters, covariance, picture.camera),
         support,
         samples,
         rms,
         agreement,
     )
+
+
+def _direction_sigma(parameters: Array, covariance: Array, camera: Camera) -> Array:
+    """Sigmas (3,) of the directions: turn, yaw and tilt of the rotor all turn the blades in the picture."""
+    if not np.isfinite(covariance).all():
+        return np.full(3, np.inf)
+    steps = np.diag(SCALE * 1e-3)
+    turned = [directions(parameters + step, camera) - directions(parameters - step, camera) for step in steps]
+    by = np.angle(np.exp(1j * np.array(turned))).T / (2e-3 * SCALE)
+    result: Array = np.sqrt(np.diag(by @ covariance @ by.T))
+    return result
 
 
 def settled(
