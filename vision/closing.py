@@ -25,6 +25,7 @@ NARROWEST, WIDEST = np.deg2rad(20), np.deg2rad(84)  # angle of a spike
 OFF_AXIS = np.deg2rad(14)  # from a spike's middle to an edge of the blade, and to its dots
 AT_CORNER = 35.0  # px along the axis from where a spike's side meets an edge to where it ends
 PAST_PX = 60.0  # past its apex, over which a side of a spike must not go on
+HALF_BEND_HELD = 2e-5  # 1/px, what half the bend of an edge before an end is held to
 LEAST_WORTH = -1.0  # of an edge behind a spike
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 
@@ -57,6 +58,14 @@ def goes_on(edges: tuple[Candidate, ...]) -> bool:
     return len(edges) == 2 and not any(
         _ends(edge, sign * edge.profile.direction[edge.index]) for edge in edges for sign in (1.0, -1.0)
     )
+
+
+def unexplained(edges: tuple[Candidate, ...], blade: Blade) -> float:
+    """Share of missing dots among all that ought to lie on a blade with these edges."""
+    if not blade.grid_known or len(blade.absent) == 0:
+        return 0.0
+    inside = np.all([blade.absent @ edge.outward < edge.rho - 4.0 for edge in edges], axis=0)
+    return float(inside.sum() / (inside.sum() + len(blade.dots)))
 
 
 def find_closed(
@@ -203,9 +212,9 @@ def trimmed(edge: Candidate, toward: Array, station: float) -> Candidate:
     focus = float(np.clip(0.0, t[use].min(), t[use].max()))
     place = t - focus
     offset = profile.offset[k] + 0.5 * profile.bend[k] * (t - profile.focus[k]) ** 2
-    fit = np.array([float(np.median(offset[use])), 0.0])
-    terms = np.column_stack([np.ones_like(place), place])
-    held = np.diag([1e-4, 1e-4 / 0.05**2])
+    fit = np.array([float(np.median(offset[use])), 0.0, 0.0])
+    terms = np.column_stack([np.ones_like(place), place, place * place])
+    held = np.diag([1e-4, 1e-4 / 0.05**2, 1.0 / HALF_BEND_HELD**2])
     for tolerance in (2.0, 1.2, 0.8, 0.8):
         weight = use / (1 + ((offset - terms @ fit) / tolerance) ** 2) ** 2
         information = (terms * weight[:, None]).T @ terms + held
@@ -214,15 +223,8 @@ def trimmed(edge: Candidate, toward: Array, station: float) -> Candidate:
     normal = edge.outward * np.cos(turn) - direction * np.sin(turn)
     point = edge.outward * (edge.rho + fit[0]) + direction * focus
     rho = float(normal @ point)
-    moved = replace(profile, normal=profile.normal.copy(), rho=profile.rho.copy())
-    moved.normal[k], moved.rho[k] = normal, rho
-    covariance = np.linalg.inv(information)
-    residual = offset - terms @ fit
-    scatter2 = float((residual**2 * weight).sum() / weight.sum()) + 0.01
-    slope_sigma, rho_sigma = profile.slope_sigma.copy(), profile.rho_sigma.copy()
-    slope_sigma[k] = np.sqrt(2 * scatter2 * covariance[1, 1])
-    rho_sigma[k] = np.sqrt(2 * scatter2 * covariance[0, 0] + 0.04**2)
-    moved = replace(moved, slope_sigma=slope_sigma, rho_sigma=rho_sigma)
+    moved = replace(profile, normal=profile.normal.copy(), rho=profile.rho.copy(), focus=profile.focus.copy())
+    moved.normal[k], moved.rho[k], moved.focus[k] = normal, rho, focus
     reach = (float(max(edge.ends[0], t[use].min())), float(min(edge.ends[1], t[use].max())))
     return replace(edge, outward=normal, rho=rho, profile=moved, ends=reach)
 

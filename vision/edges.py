@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate, weigh
 from vision.capture import Image
-from vision.closing import evidence_of, find_closed, goes_on, trimmed, with_partner
+from vision.closing import evidence_of, find_closed, goes_on, trimmed, unexplained, with_partner
+from vision.edge_sigma import settled
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
 from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
@@ -28,6 +29,8 @@ FROM_EXPECTED = np.deg2rad(28)  # half the taper, the root's flare, perspective,
 LARGEST_TAPER = np.deg2rad(16)
 LARGEST_FLARE = np.deg2rad(28)  # of the root; so much is believed only where the axis is known
 LEAST_VALUE = 1.2
+MOST_MISSING = 0.35  # of the dots within the edges, beyond which they are not believed
+LEAST_GONE = 3  # missing dots between two steps that tell which of them is the edge
 PLAIN = 2.5  # times the blade's own texture: a step that needs no other witness to be an edge
 BEHIND_SHOULDER = 12.0  # px: so far behind it an end no longer bends the edges
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
@@ -56,7 +59,7 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smooth, noise, other)
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
-    chosen = _choose(candidates, blade.texture, largest)
+    chosen = _choose([c for c in candidates if not _hides_nothing(c, candidates, blade)], blade.texture, largest)
     if len(chosen) == 1:
         chosen = with_partner(chosen[0], candidates, blade, largest)
     ending = None
@@ -67,6 +70,8 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
     if closed is not None and closed.evidence > evidence_of(chosen, blade):
         ending = closed.ending
         chosen = tuple(trimmed(edge, ending.toward, ending.shoulder - BEHIND_SHOULDER) for edge in closed.edges)
+    elif chosen and (missing := unexplained(chosen, blade)) > MOST_MISSING:
+        return Found((), axis, None, (f"no edge: {missing:.0%} of the dots within the likeliest ones are missing",))
     elif evidence_of(chosen, blade) < 0:
         return Found((), axis, None, ("no edge: steps and dots contradict each other",))
     if ending is not None and not chosen:
@@ -75,9 +80,25 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
     if not chosen:
         best = max((c.support for c in candidates), default=0.0)
         return Found((), axis, None, (f"no edge: the best line beside the dots has {best:.0%} support",))
+    chosen = tuple(settled(edge, ending is not None) for edge in chosen)
     directions = np.array([np.arctan2(c.outward[1], c.outward[0]) + np.pi / 2 for c in chosen])
     axis = 0.5 * np.angle(np.exp(2j * directions).sum()) % np.pi
     return Found(chosen, float(axis), ending, ())
+
+
+def _hides_nothing(one: Candidate, candidates: list[Candidate], blade: Blade) -> bool:
+    """Whether a step nearer to the dots is an edge as well, and dots are missing and none are seen in between: then
+    the farther step is none of the blade's."""
+    for near in candidates:
+        if near.value < LEAST_VALUE or float(near.outward @ one.outward) < np.cos(LARGEST_TAPER):
+            continue
+        gone, seen = (
+            int(((points @ one.outward < one.rho - 4.0) & (points @ near.outward > near.rho + 4.0)).sum())
+            for points in (blade.absent, blade.dots)
+        )
+        if gone >= LEAST_GONE and seen == 0:
+            return True
+    return False
 
 
 def _choose(candidates: list[Candidate], texture: float, largest: float) -> tuple[Candidate, ...]:
@@ -109,8 +130,8 @@ def edge_of(candidate: Candidate, factor: float) -> Edge:
     return Edge(
         Line(float(np.arctan2(normal[1], normal[0])), abs(candidate.rho * factor)),
         candidate.outward.copy(),
-        float(np.hypot(profile.slope_sigma[k], 0.0005)),
-        float(profile.rho_sigma[k] * factor),
+        float(profile.slope_sigma[k]),
+        float(np.hypot(profile.rho_sigma[k], profile.focus[k] * profile.slope_sigma[k]) * factor),
         candidate.support,
         (candidate.outward * candidate.rho + ends[:, None] * direction) * factor,
     )

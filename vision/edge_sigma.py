@@ -1,0 +1,49 @@
+"""How far an edge may be off, from how its steps scatter about it and how long they err together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.candidates import Candidate
+
+Array = NDArray[Any]  # of floats
+
+FOCUS_PX = 160.0  # standard deviation of the weight about the place where a bending edge is to be right
+BEND_HELD = 1e-4  # what an edge's bend is held to, 1/px
+STEP_PX = 0.015  # standard deviation of a step's place that no scatter shows
+RHO_PX, SLOPE = 0.006, 3e-5  # of a line at best: the camera's own
+LONGEST = 12.0  # how many neighbouring steps at most err together
+
+
+def settled(edge: Candidate, alike: bool) -> Candidate:
+    """The edge with the standard deviations of its offset at its focus and of its slope.
+
+    alike: it was fitted to all its run alike, else about its focus."""
+    profile, k = edge.profile, edge.index
+    t, focus = profile.t[k], float(profile.focus[k])
+    use = profile.agrees[k] & (t >= edge.ends[0] - 1) & (t <= edge.ends[1] + 1)
+    if use.sum() < 6:
+        return edge
+    x = t[use] - focus
+    residual = profile.offset[k][use]
+    weight = np.ones_like(x) if alike else np.exp(-0.5 * (x / FOCUS_PX) ** 2)
+    terms = np.column_stack([np.ones_like(x), x, x * x])
+    held = np.diag([1e-6, 1e-6, 1.0 / BEND_HELD**2])
+    if alike:
+        held = np.diag([1e-6, 1e-6, 1.0 / (0.3 * BEND_HELD) ** 2])
+        residual = residual + 0.5 * profile.bend[k] * x * x
+        solution = np.linalg.solve(terms.T @ terms + held, terms.T @ residual)
+        residual = residual - terms @ solution
+    variance = float((residual**2 * weight).sum() / weight.sum()) + STEP_PX**2
+    lag = float((residual[1:] * residual[:-1]).mean()) / variance
+    together = float(np.clip((1 + lag) / max(1 - lag, 1e-3), 1.0, LONGEST))
+    inverse = np.linalg.inv((terms * weight[:, None]).T @ terms + held)
+    spread = inverse @ ((terms * (weight**2)[:, None]).T @ terms + held) @ inverse
+    slope_sigma, rho_sigma = profile.slope_sigma.copy(), profile.rho_sigma.copy()
+    slope_sigma[k] = np.hypot(np.sqrt(variance * together * spread[1, 1]), SLOPE)
+    rho_sigma[k] = np.hypot(np.sqrt(variance * together * spread[0, 0]), RHO_PX)
+    return replace(edge, profile=replace(profile, slope_sigma=slope_sigma, rho_sigma=rho_sigma))
