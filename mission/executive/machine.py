@@ -33,8 +33,9 @@ class _State(NestedAsyncState):
 class _Transition(NestedAsyncTransition):
     """What costs time and gives nothing here is left out: tasks for guards, and callbacks on final states."""
 
-    async def _eval_conditions(self, event_data: Any) -> bool:
-        return all([await condition.check(event_data) for condition in self.conditions])
+    async def _eval_conditions(self, event_data: Any) -> bool:  # type: ignore[override, unused-ignore]
+        conditions: list[Any] = self.conditions
+        return all([await condition.check(event_data) for condition in conditions])
 
     def _final_check(self, event_data: Any, state_tree: Any, enter_partials: Any) -> tuple[list[Any], bool]:
         return [], False
@@ -58,9 +59,10 @@ class _Library(HierarchicalAsyncMachine):
                 self._known[path] = found
         return found
 
-    async def process_context(self, func: Callable[[], Awaitable[bool]], model: Any) -> bool:
+    async def process_context(self, func: Callable[[], Awaitable[Any]], model: Any) -> bool:
         """One task alone moves this machine, and its cancellation is nothing to swallow."""
-        return await func()
+        result: bool = await func()
+        return result
 
     async def cancel_running_transitions(self, model: Any, msg: Any = None) -> None:
         """There are none: see `process_context`."""
