@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate
 from vision.capture import Image
-from vision.ending_kernels import likeliest, outline_through, summits_over
+from vision.ending_kernels import fittest, likeliest, summits_over
 from vision.evidence import Blade
 from vision.lines import visible_stretch
 from vision.profile_kernels import seen_in_lanes, steps_in_lanes
@@ -228,18 +228,10 @@ def _best(
         return None
     end = np.array([border + 1e3])
     goes_on = float((low.until(end) + high.until(end))[0]) + hole * len(gone)
-    fits = []
-    for k in np.flatnonzero(evidences > best - RIVAL).tolist():
-        at = places[k] - shift[k]
-        lanes_seen = (at >= 0) & (seen[np.arange(LANES), np.maximum(at, 0)] > 0.4)
-        station, sigma, misfit = float(s[places[k]]), UNREFINED_PX, 0.0
-        if lanes_seen.sum() >= LEAST_LANES:
-            farther, spread, misfit = outline_through(
-                size, at, int(places[k]), lanes_seen, DEPTHS[k], float(reach[k]), STEP
-            )
-            station, sigma = station + farther, float(np.hypot(0.5, spread))
-        fits.append((float(evidences[k]) - misfit * min(1.0, wide / LANES / APART_PX), k, station, sigma))
-    evidence, k, station, sigma = max(fits)
+    least, tells = best - RIVAL, min(1.0, wide / LANES / APART_PX)
+    k, station, sigma, evidence = fittest(
+        size, seen, shift, DEPTHS, reach, places, evidences, least, LEAST_LANES, UNREFINED_PX, float(s[0]), STEP, tells
+    )
     lane_share = float(SHARES[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
     lane = float(low.at(station) + lane_share * (high.at(station) - low.at(station)))
     outermost = station + skew * (lane_share - 0.5) * wide

@@ -162,3 +162,37 @@ def outline_through(
     for j in range(n):
         misfit += 0.5 * min(((residual[j] - farther + depth[j] * longer) / STRAY_PX) ** 2, 9.0)
     return farther, np.sqrt(3.0 * variance), misfit
+
+
+@compiled
+def fittest(
+    size: Floats, seen: Floats, shift: NDArray[np.int64], depths: Floats, reach: Floats, places: NDArray[np.int64],
+    evidences: Floats, least_evidence: float, least_lanes: int, unrefined_px: float, first_px: float, step: float,
+    misfit_weight: float,
+) -> tuple[int, float, float, float]:  # fmt: skip
+    """Which of k outlines with more than the least evidence is the likeliest once it is fitted to the steps near it:
+    (outline, station of its outermost point, standard deviation in px, evidence).
+
+    size, seen (lanes, m): steps and how much each is one, at stations from first_px on, `step` px apart. Of each
+    outline: shift (k, lanes) and places (k,) as for `likeliest`, depths (k, lanes) and reach (k,) px. With fewer than
+    least_lanes it is left where it is, with the standard deviation unrefined_px. misfit_weight: of what a lane tells.
+    """
+    lanes = size.shape[0]
+    at, there = np.empty(lanes, np.int64), np.empty(lanes, np.bool_)
+    best, best_station, best_sigma, most = -1, 0.0, 0.0, -np.inf
+    for k in range(len(reach)):
+        if not evidences[k] > least_evidence:
+            continue
+        count = 0
+        for lane in range(lanes):
+            at[lane] = places[k] - shift[k, lane]
+            there[lane] = at[lane] >= 0 and seen[lane, max(at[lane], 0)] > 0.4
+            count += there[lane]
+        station, sigma, misfit = first_px + step * places[k], unrefined_px, 0.0
+        if count >= least_lanes:
+            farther, spread, misfit = outline_through(size, at, places[k], there, depths[k], reach[k], step)
+            station, sigma = station + farther, np.sqrt(0.25 + spread * spread)
+        evidence = evidences[k] - misfit * misfit_weight
+        if evidence >= most:
+            best, best_station, best_sigma, most = k, station, sigma, evidence
+    return best, best_station, best_sigma, most
