@@ -16,7 +16,7 @@ from devices.torn_files import LARGEST
 
 FORMAT = 1  # of the journal, as its first line says
 _encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False).encode
-_NAMES = {"event": ("event",), "transition": ("event", "key", "to")}
+_NAMES = {"event": ("event",), "transition": ("key", "to")}
 SLOWEST_DISK_S = 1.0  # a disk that takes longer must not hold up the flight
 
 

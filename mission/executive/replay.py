@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mission.executive.decision import autonomy_after, decide
 from mission.executive.events import EventError, event
-from mission.executive.journal import Entry, read_journal
+from mission.executive.journal import Entry, JournalError, read_journal
 from mission.executive.machine import Machine
 from mission.executive.machine import entries as skips
 from mission.executive.queue import Queued
@@ -67,7 +67,10 @@ class _Player:
         self.mission = mission
         self.autonomy: Autonomy = fields.get("autonomy", "full")
         history, taken = dict(fields.get("history", {})), dict(fields.get("taken", {}))
-        self.machine = Machine(mission, Configuration(str(fields["state"]), history, taken))
+        state = str(fields.get("state"))
+        if state not in mission.states:
+            raise JournalError(f"the record begins in {state!r}, a state that its mission does not have")
+        self.machine = Machine(mission, Configuration(state, history, taken))
         self.transitions: dict[str, Transition] = {
             entry.key: entry for entry in (*mission.transitions(), *skips(mission).values())
         }
@@ -75,13 +78,13 @@ class _Player:
     async def happen(self, line: int, entry: Entry) -> tuple[Played, Step | None]:
         """Decide what a recorded event leads to, and let it happen."""
         fields = entry.fields
-        name, was = str(fields["event"]), str(fields["led_to"])
+        name, was = str(fields["event"]), str(fields.get("led_to"))
 
         def played(difference: str | None = None, step: Step | None = None) -> tuple[Played, Step | None]:
             return Played(line, entry.t, name, self.machine.state, was, step, difference), step
 
-        if fields["state"] != self.machine.state:
-            return played(f"recorded in {fields['state']}, now in {self.machine.state}")
+        if fields.get("state") != self.machine.state:
+            return played(f"recorded in {fields.get('state')}, now in {self.machine.state}")
         if was in ("stale", "confirmation"):
             return played()
         key = fields.get("only")

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mission.executive.events import EVENTS, Severity
+from mission.language.conditions import Condition
 from mission.language.document import Mission, Transition
 from mission.language.exploration import Edge, Exploration, Situation
 
 Kind = Literal["way", "outcome", "safety", "operator"]
+
+_LONGEST = 28  # characters of a condition, so that a label stays beside the behaviour
 
 
 @dataclass(frozen=True)
@@ -50,9 +53,11 @@ def kind_of(transition: Transition) -> Kind:
 
 
 def initial_path(exploration: Exploration) -> tuple[Edge, ...]:
-    """The shortest way of outcomes alone from the beginning to completion (or else to any end)."""
+    """The shortest way of outcomes alone from the beginning to completion (or else to any end); where there is one,
+    without conditions: what is skipped under a condition belongs to it."""
     first = exploration.situations[0]
-    for goals in (exploration.finals("completed"), exploration.finals()):
+    completed, ended = exploration.finals("completed"), exploration.finals()
+    for goals, guarded in ((completed, False), (completed, True), (ended, True)):
         came: dict[Situation, Edge | None] = {first: None}
         waiting = deque([first])
         while waiting:
@@ -65,19 +70,25 @@ def initial_path(exploration: Exploration) -> tuple[Edge, ...]:
                     edge = came[edge.source]
                 return tuple(reversed(path))
             for edge in exploration.edges.get(situation, ()):
-                if edge.event not in EVENTS and edge.event == edge.transition.event and edge.target not in came:
+                outcome = edge.event not in EVENTS and edge.event == edge.transition.event
+                if outcome and edge.target not in came and (guarded or not edge.transition.guarded):
                     came[edge.target] = edge
                     waiting.append(edge.target)
     return ()
+
+
+def _short(condition: Condition) -> str:
+    text = str(condition)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 2].rstrip()} …"
 
 
 def label(transition: Transition) -> str:
     """The event with what it depends on."""
     parts = [transition.event]
     if transition.when is not None:
-        parts.append(f"[{transition.when}]")
+        parts.append(f"[{_short(transition.when)}]")
     if transition.unless is not None:
-        parts.append(f"[not: {transition.unless}]")
+        parts.append(f"[not: {_short(transition.unless)}]")
     if transition.after_s is not None:
         parts.append(f"after {transition.after_s:g} s")
     if transition.retries is not None:
