@@ -26,6 +26,7 @@ OFF_AXIS = np.deg2rad(14)  # from a spike's middle to an edge of the blade, and 
 AT_CORNER = 35.0  # px along the axis from where a spike's side meets an edge to where it ends
 PAST_PX = 60.0  # past its apex, over which a side of a spike must not go on
 HALF_BEND_HELD = 2e-5  # 1/px, what half the bend of an edge before an end is held to
+LEAST_PARTNER = 0.0  # worth of an edge beside which no dots lie
 LEAST_WORTH = -1.0  # of an edge behind a spike
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 
@@ -51,6 +52,18 @@ def evidence_of(edges: tuple[Candidate, ...], blade: Blade) -> float:
         if len(blade.absent):
             inside &= blade.absent @ edge.outward < edge.rho - 4.0
     return total + (HOLE if blade.grid_known else HOLE / 2) * float(inside.sum()) + (ALONE if len(edges) == 1 else 0.0)
+
+
+def opposite(one: Candidate, two: Candidate, blade: Blade, largest: float) -> bool:
+    """Whether two candidates face away from each other and are parallel on the blade, but for an angle (rad)."""
+    if float(-one.outward @ two.outward) < np.cos(2.0 * largest):
+        return False
+    ways = []
+    for edge in (one, two):
+        direction = edge.profile.direction[edge.index]
+        middle = edge.outward * edge.rho + sum(edge.ends) / 2 * direction
+        ways.append(blade.on_surface(middle, direction))
+    return bool(float(-ways[0] @ ways[1]) > np.cos(largest))
 
 
 def goes_on(edges: tuple[Candidate, ...]) -> bool:
@@ -175,7 +188,7 @@ def _hypotheses(
 ) -> Iterator[tuple[tuple[Candidate, ...], tuple[Side, Side], Array]]:
     for a, one in enumerate(candidates):
         for two in candidates[a + 1 :]:
-            if float(-one.outward @ two.outward) < np.cos(largest):
+            if not opposite(one, two, blade, largest):
                 continue
             way = one.outward - two.outward
             way = np.array([-way[1], way[0]]) / np.linalg.norm(way)
@@ -233,7 +246,7 @@ def with_partner(chosen: Candidate, candidates: list[Candidate], blade: Blade, l
     """An edge, and the blade's other edge where it comes into view only where no dots lie beside it."""
     best: tuple[float, Candidate] | None = None
     for edge in candidates:
-        if float(-edge.outward @ chosen.outward) < np.cos(largest) or edge.worth < 0 or edge.value > -np.inf:
+        if edge is chosen or edge.worth < LEAST_PARTNER or not opposite(edge, chosen, blade, largest):
             continue
         first, last = edge.profile.t[edge.index][[0, -1]]
         evidence = float(side_of(edge, edge.profile.direction[edge.index]).evidence.sum())

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate, weigh
 from vision.capture import Image
-from vision.closing import evidence_of, find_closed, goes_on, trimmed, unexplained, with_partner
+from vision.closing import evidence_of, find_closed, goes_on, opposite, trimmed, unexplained, with_partner
 from vision.edge_sigma import settled
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
@@ -59,7 +59,7 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smooth, noise, other)
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
-    chosen = _choose([c for c in candidates if not _hides_nothing(c, candidates, blade)], blade.texture, largest)
+    chosen = _choose([c for c in candidates if not _hides_nothing(c, candidates, blade)], blade, largest)
     if len(chosen) == 1:
         chosen = with_partner(chosen[0], candidates, blade, largest)
     ending = None
@@ -101,7 +101,7 @@ def _hides_nothing(one: Candidate, candidates: list[Candidate], blade: Blade) ->
     return False
 
 
-def _choose(candidates: list[Candidate], texture: float, largest: float) -> tuple[Candidate, ...]:
+def _choose(candidates: list[Candidate], blade: Blade, largest: float) -> tuple[Candidate, ...]:
     """The pair of nearly parallel candidates that encloses the dots best, or the best one, or none."""
     good = [c for c in candidates if c.value >= LEAST_VALUE]
     if not good:
@@ -110,14 +110,14 @@ def _choose(candidates: list[Candidate], texture: float, largest: float) -> tupl
     best_pair: tuple[float, tuple[Candidate, ...]] | None = None
     for a in range(len(good)):
         for b in range(a + 1, len(good)):
-            if float(-good[a].outward @ good[b].outward) < np.cos(largest):
+            if not opposite(good[a], good[b], blade, largest):
                 continue
             total = good[a].value + good[b].value
             if best_pair is None or total > best_pair[0]:
                 best_pair = (total, (good[a], good[b]))
     if best_pair is not None and min(c.value for c in best_pair[1]) > good[0].value - SECOND_EDGE:
         return best_pair[1]
-    alone = [c for c in good if c.beyond or c.parallax > 0.5 or c.step > PLAIN * texture]
+    alone = [c for c in good if c.beyond or c.parallax > 0.5 or c.step > PLAIN * blade.texture]
     return tuple(alone[:1])
 
 

@@ -45,6 +45,14 @@ class Blade:
     slope: Array | None = None
     focal: float = 616.0
 
+    def on_surface(self, point: Array, way: Array) -> Array:
+        """Unit vector (3,) on the surface that is seen as `way` (2,) at `point` (2,) of the image."""
+        ray = point / self.focal
+        slope = np.zeros(2) if self.slope is None else self.slope
+        lean = float(slope @ way) / max(1.0 - float(slope @ ray), 0.2)
+        vector = np.r_[lean, way + ray * lean]
+        return np.asarray(vector / np.linalg.norm(vector))
+
     def skew(self, point: Array, toward: Array) -> float:
         """How much farther along `toward` (2,) a line across the blade, square to its axis on the surface, gets in the
         image at `point` (2,) per px to the side."""
