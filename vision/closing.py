@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ NARROWEST, WIDEST = np.deg2rad(20), np.deg2rad(84)  # angle of a spike
 OFF_AXIS = np.deg2rad(14)  # from a spike's middle to an edge of the blade, and to its dots
 AT_CORNER = 35.0  # px along the axis from where a spike's side meets an edge to where it ends
 PAST_PX = 60.0  # past its apex, over which a side of a spike must not go on
-HALF_BEND_HELD = 2e-5  # 1/px, what half the bend of an edge before an end is held to
 LEAST_PARTNER = 0.0  # worth of an edge beside which no dots lie
 LEAST_WORTH = -1.0  # of an edge behind a spike
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
@@ -212,34 +211,6 @@ def _ends(edge: Candidate, toward: Array) -> bool:
     if float(edge.profile.direction[edge.index] @ toward) > 0:
         return bool(t[-1] - last > BORDER)
     return bool(first - t[0] > BORDER)
-
-
-def trimmed(edge: Candidate, toward: Array, station: float) -> Candidate:
-    """The edge fitted to its steps before a station along `toward` (2,), px: where an end no longer bends it."""
-    profile, k = edge.profile, edge.index
-    direction, t = profile.direction[k], profile.t[k]
-    before = edge.rho * float(edge.outward @ toward) + t * float(direction @ toward) < station
-    use = before & (t >= edge.ends[0] - 1) & (t <= edge.ends[1] + 1) & np.isfinite(profile.offset[k])
-    if use.sum() < 10:
-        return edge
-    focus = float(np.clip(0.0, t[use].min(), t[use].max()))
-    place = t - focus
-    offset = profile.offset[k] + 0.5 * profile.bend[k] * (t - profile.focus[k]) ** 2
-    fit = np.array([float(np.median(offset[use])), 0.0, 0.0])
-    terms = np.column_stack([np.ones_like(place), place, place * place])
-    held = np.diag([1e-4, 1e-4 / 0.05**2, 1.0 / HALF_BEND_HELD**2])
-    for tolerance in (2.0, 1.2, 0.8, 0.8):
-        weight = use / (1 + ((offset - terms @ fit) / tolerance) ** 2) ** 2
-        information = (terms * weight[:, None]).T @ terms + held
-        fit = np.linalg.solve(information, (terms * weight[:, None]).T @ offset)
-    turn = float(np.arctan(fit[1]))
-    normal = edge.outward * np.cos(turn) - direction * np.sin(turn)
-    point = edge.outward * (edge.rho + fit[0]) + direction * focus
-    rho = float(normal @ point)
-    moved = replace(profile, normal=profile.normal.copy(), rho=profile.rho.copy(), focus=profile.focus.copy())
-    moved.normal[k], moved.rho[k], moved.focus[k] = normal, rho, focus
-    reach = (float(max(edge.ends[0], t[use].min())), float(min(edge.ends[1], t[use].max())))
-    return replace(edge, outward=normal, rho=rho, profile=moved, ends=reach)
 
 
 def with_partner(chosen: Candidate, candidates: list[Candidate], blade: Blade, largest: float) -> tuple[Candidate, ...]:

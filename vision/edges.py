@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate, weigh
 from vision.capture import Image
-from vision.closing import evidence_of, find_closed, goes_on, opposite, trimmed, unexplained, with_partner
-from vision.edge_sigma import settled
+from vision.closing import evidence_of, find_closed, goes_on, opposite, unexplained, with_partner
+from vision.edge_fit import settled, trimmed
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
 from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed

@@ -38,8 +38,6 @@ SUMMITS = (0.0, -0.1, 0.1, -0.3, 0.3, -0.6, 0.6)  # of an outline, from the midd
 LOPSIDED = -8.0  # evidence of an outline whose summit is all the way to one side
 LEAST_LANES, UNREFINED_PX = 6, 4.0  # that an outline is fitted to, and its standard deviation with fewer
 BORDER = 6.0  # px: an outline nearer to the image border than this is not seen to close
-
-
 SHARES = np.linspace(FIRST_SHARE, 1 - FIRST_SHARE, LANES)  # where lanes lie, 0 on the lower edge and 1 on the upper
 
 

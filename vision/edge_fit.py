@@ -1,4 +1,5 @@
-"""How far an edge may be off, from how its steps scatter about it and how long they err together."""
+"""An edge fitted once more to its steps before an end; and how far it may be off, from how its steps scatter about it
+and how long they err together."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ from vision.candidates import Candidate
 
 Array = NDArray[Any]  # of floats
 
+HALF_BEND_HELD = 2e-5  # 1/px, what half the bend of an edge before an end is held to
 FOCUS_PX = 160.0  # standard deviation of the weight about the place where a bending edge is to be right
 BEND_HELD = 1e-4  # what an edge's bend is held to, 1/px
 STEP_PX = 0.015  # standard deviation of a step's place that no scatter shows
@@ -47,3 +49,31 @@ def settled(edge: Candidate, alike: bool) -> Candidate:
     slope_sigma[k] = np.hypot(np.sqrt(variance * together * spread[1, 1]), SLOPE)
     rho_sigma[k] = np.hypot(np.sqrt(variance * together * spread[0, 0]), RHO_PX)
     return replace(edge, profile=replace(profile, slope_sigma=slope_sigma, rho_sigma=rho_sigma))
+
+
+def trimmed(edge: Candidate, toward: Array, station: float) -> Candidate:
+    """The edge fitted to its steps before a station along `toward` (2,), px: where an end no longer bends it."""
+    profile, k = edge.profile, edge.index
+    direction, t = profile.direction[k], profile.t[k]
+    before = edge.rho * float(edge.outward @ toward) + t * float(direction @ toward) < station
+    use = before & (t >= edge.ends[0] - 1) & (t <= edge.ends[1] + 1) & np.isfinite(profile.offset[k])
+    if use.sum() < 10:
+        return edge
+    focus = float(np.clip(0.0, t[use].min(), t[use].max()))
+    place = t - focus
+    offset = profile.offset[k] + 0.5 * profile.bend[k] * (t - profile.focus[k]) ** 2
+    fit = np.array([float(np.median(offset[use])), 0.0, 0.0])
+    terms = np.column_stack([np.ones_like(place), place, place * place])
+    held = np.diag([1e-4, 1e-4 / 0.05**2, 1.0 / HALF_BEND_HELD**2])
+    for tolerance in (2.0, 1.2, 0.8, 0.8):
+        weight = use / (1 + ((offset - terms @ fit) / tolerance) ** 2) ** 2
+        information = (terms * weight[:, None]).T @ terms + held
+        fit = np.linalg.solve(information, (terms * weight[:, None]).T @ offset)
+    turn = float(np.arctan(fit[1]))
+    normal = edge.outward * np.cos(turn) - direction * np.sin(turn)
+    point = edge.outward * (edge.rho + fit[0]) + direction * focus
+    rho = float(normal @ point)
+    moved = replace(profile, normal=profile.normal.copy(), rho=profile.rho.copy(), focus=profile.focus.copy())
+    moved.normal[k], moved.rho[k], moved.focus[k] = normal, rho, focus
+    reach = (float(max(edge.ends[0], t[use].min())), float(min(edge.ends[1], t[use].max())))
+    return replace(edge, outward=normal, rho=rho, profile=moved, ends=reach)
