@@ -82,12 +82,13 @@ def observed(images: dict[str, Image], geometry: RigGeometry | None) -> BladeObs
     from vision.capture import StereoFrames
     from vision.pipeline import Eye, observe_single
 
-    alone = set(images) == {"left_laser"}
-    if geometry is None or alone or geometry.laser is None:
+    if geometry is None or geometry.laser is None:
         return observe_single(images["left_laser"], geometry, perf_counter)
     left, right, left_laser, right_laser = (images.get(name) for name in NAMES)
-    frames = StereoFrames(0.0, left, right, left_laser, right_laser)
-    return Eye(geometry, perf_counter).observe(frames)
+    seen = Eye(geometry, perf_counter).observe(StereoFrames(0.0, left, right, left_laser, right_laser))
+    if not seen.valid and set(images) == {"left_laser"}:
+        return observe_single(images["left_laser"], geometry, perf_counter)
+    return seen
 
 
 def _write(path: Path, image: Image, seen: BladeObservation) -> None:
