@@ -29,6 +29,7 @@ Array = NDArray[Any]  # of floats
 CANDIDATES = 40
 LAST_SAMPLES = 84  # profiles along a line when it is measured for good
 LEAST_SUPPORT = 0.5
+FOLLOWED_PX = 25.0  # of a step that a line follows, worth as much as one unit of what else speaks for it
 LEAST_RUN = 50.0  # px: a shorter stretch of an edge with no dots beside it is none
 
 
@@ -92,8 +93,16 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
         return []
     profile = profile.take(which)
     found = _weighed(profile, blade, smooth, noise, other, low[which], high[which])
-    found.sort(key=lambda c: -c.worth)
-    return [c for k, c in enumerate(found) if not any(_same(c, better) for better in found[:k])]
+    # Of fits to one step that which follows more of it is right: a line that starts askew may lose half of it.
+    found.sort(key=lambda c: -c.worth - _followed(c) / FOLLOWED_PX)
+    found = [c for k, c in enumerate(found) if not any(_same(c, better) for better in found[:k])]
+    return sorted(found, key=lambda c: -c.worth)
+
+
+def _followed(one: Candidate) -> float:
+    """Along how many px of it the line follows its step."""
+    t = one.profile.t[one.index]
+    return float(one.profile.agrees[one.index].sum()) * float(t[1] - t[0])
 
 
 def _same(one: Candidate, other: Candidate) -> bool:
