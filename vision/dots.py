@@ -74,10 +74,10 @@ def find_spots(off: Image | None, on: Image, reachable: Image | None = None, oth
 
 @lru_cache(maxsize=8)
 def _quadratic(reach: int) -> tuple[Array, Array]:
-    """(fit (6, p), basis (p, 6)) of a quadratic surface on a square of (2 reach + 1)² pixels."""
+    """(fit (6, p), basis (6, p)) of a quadratic surface on a square of (2 reach + 1)² pixels."""
     v, u = (g.ravel() / reach for g in np.mgrid[-reach : reach + 1, -reach : reach + 1])
     basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
-    return np.linalg.pinv(basis).astype(np.float32), np.ascontiguousarray(basis, np.float32)
+    return np.linalg.pinv(basis).astype(np.float32), np.ascontiguousarray(basis.T, np.float32)
 
 
 @dataclass(frozen=True)

@@ -121,17 +121,21 @@ def _follow(off: Image, on: Image, shift: Array, steps: int, rows: int) -> None:
     margin = int(max(abs(shift[0]), abs(shift[1]))) + 6
     if 3 * margin > height or 3 * margin > width:
         return
-    places = np.empty((((height - 2 * margin) // rows + 1) * (width - 2 * margin), 2), np.int32)
+    places = np.empty((((height - 2 * margin) // rows + 1) * (width - 2 * margin) + 1, 2), np.int32)
     slopes = np.empty((len(places), 2), np.float32)
     count = 0
+    steep, inner = np.empty(width, np.uint8), width - 2 * margin
     for v in range(margin, height - margin, rows):
-        for u in range(margin, width - margin):
-            gu = np.int32(on[v, u + 1]) - np.int32(on[v, u - 1])
-            gv = np.int32(on[v + 1, u]) - np.int32(on[v - 1, u])
-            if gu * gu + gv * gv >= STEEP * STEEP:
-                places[count, 0], places[count, 1] = v, u
-                slopes[count, 0], slopes[count, 1] = gu, gv
-                count += 1
+        above, below = on[v - 1, margin:], on[v + 1, margin:]
+        before, after = on[v, margin - 1 :], on[v, margin + 1 :]
+        for i in range(inner):
+            gu, gv = np.int32(after[i]) - np.int32(before[i]), np.int32(below[i]) - np.int32(above[i])
+            steep[i] = gu * gu + gv * gv >= STEEP * STEEP
+        for i in range(inner):
+            places[count, 0], places[count, 1] = v, margin + i
+            slopes[count, 0] = np.int32(after[i]) - np.int32(before[i])
+            slopes[count, 1] = np.int32(below[i]) - np.int32(above[i])
+            count += steep[i]
     one = np.float32(1)
     start_u, start_v = shift[0], shift[1]
     for _ in range(steps):

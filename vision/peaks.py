@@ -133,11 +133,16 @@ def _maxima(gain: Array, step: Array, noise: float, apart: float, threshold: flo
     height, width = gain.shape
     count = 0
     least, part, bound = np.float32(noise), np.float32(apart), np.float32(threshold)
+    high, places = np.empty(width, np.uint8), np.empty(width + 1, np.int64)
     for v in range(2, height - 2):
         values, slopes = gain[v], step[v]
+        for u in range(width):
+            high[u] = values[u] > bound * max(least, part * slopes[u])
+        found = 0
         for u in range(2, width - 2):
-            if values[u] <= bound * max(least, part * slopes[u]):
-                continue
+            places[found] = u
+            found += high[u]
+        for u in places[:found]:
             if reachable[2 * v, 2 * u] == 0 or count == len(level):
                 continue
             value = values[u] / max(least, part * slopes[u])

@@ -14,6 +14,7 @@ from vision.compiled import compiled
 
 Floats = NDArray[Any]
 
+WIDE = 24  # columns that the widest square is made up to, for vectors
 CONVERGED_PX = 0.04  # a step of Gauss and Newton that needs no other: the next is its square
 
 
@@ -46,90 +47,103 @@ def _solve(matrix: Floats, right: Floats, count: int, factored: bool) -> None:
 
 @compiled
 def _equations(
-    signal: Floats, weights: Floats, burnt: NDArray[np.bool_], spot: Floats, shape: Floats, full: bool,
-    normal: Floats, right: Floats,
-) -> tuple[float, float]:  # fmt: skip
+    pixels: Floats, side: int, spot: Floats, shape: Floats, full: bool, sums: Floats, normal: Floats, right: Floats
+) -> tuple[float, float]:
     """Normal equations of the residual about a spot (u, v, level, base) in terms of base and the bell times (1, x, y,
     x², xy, y²), in this order, x and y from the spot's centre, the last three only if `full`; returned: weighted
-    squares of residuals, their number."""
-    side = int(np.sqrt(signal.size) + 0.5)
-    reach = side // 2
+    squares of residuals, their number.
+
+    pixels (side, 3 · WIDE): signal, weights, and 1 where burnt, weightless from column `side` on. sums (17 · WIDE,):
+    room for sums down each column, which are taken side by side and only then put together."""
+    reach, wide = side // 2, (side + 3) // 4 * 4
     u, v, level, base = spot[0], spot[1], spot[2], spot[3]
     pxx, pxy, pyy = shape[0], shape[1], shape[2]
+    sums[:] = 0.0
+    # the bell in each column's first row, and by how much it falls from there to the next row, and that from row to row
+    x, y = -reach - u, -reach - v
+    bell, down = (
+        np.exp(-0.5 * (pxx * x + 2 * pxy * y) * x - 0.5 * pyy * y * y),
+        np.exp(-0.5 * pyy * (2 * y + 1) - pxy * x),
+    )
+    across, change, turn = np.exp(-0.5 * pxx * (2 * x + 1) - pxy * y), np.exp(-pxx), np.exp(-pxy)
+    for k in range(side):
+        sums[k], sums[WIDE + k] = bell, down
+        bell, across, down = bell * across, across * change, down * turn
+    fall = np.exp(-pyy)
+    for i in range(side):
+        y = i - reach - v
+        row = pixels[i]
+        for k in range(wide):
+            light = sums[k]
+            residual = row[k] - level * light - base
+            weight = 0.0 if (row[2 * WIDE + k] > 0) & (residual < 0) else row[WIDE + k]
+            single = weight * light
+            both = single * light
+            apart = single * residual
+            sums[k] = light * sums[WIDE + k]
+            sums[WIDE + k] *= fall
+            sums[2 * WIDE + k] += weight
+            sums[3 * WIDE + k] += single
+            sums[4 * WIDE + k] += single * y
+            sums[5 * WIDE + k] += both
+            sums[6 * WIDE + k] += both * y
+            sums[7 * WIDE + k] += both * y * y
+            sums[8 * WIDE + k] += weight * residual
+            sums[9 * WIDE + k] += apart
+            sums[10 * WIDE + k] += apart * y
+            sums[11 * WIDE + k] += weight * residual * residual
+            sums[12 * WIDE + k] += 1.0 if weight > 0 else 0.0
+            if full:
+                sums[13 * WIDE + k] += single * y * y
+                sums[14 * WIDE + k] += both * y * y * y
+                sums[15 * WIDE + k] += both * y * y * y * y
+                sums[16 * WIDE + k] += apart * y * y
     normal[:] = 0.0
     right[:] = 0.0
-    misfit, number = 0.0, 1.0 * signal.size
-    change = np.exp(-pxx)
-    for row in range(side):
-        y = row - reach - v
-        x = -reach - u
-        bell = np.exp(-0.5 * (pxx * x * x + 2 * pxy * x * y + pyy * y * y))
-        ratio = np.exp(-0.5 * (pxx * (2 * x + 1) + 2 * pxy * y))
-        w0, e0, e1, e2, s0, s1, s2, s3, s4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        r, r0, r1, r2 = 0.0, 0.0, 0.0, 0.0
-        for k in range(row * side, row * side + side):
-            residual = signal[k] - level * bell - base
-            weight = 1.0 * weights[k]
-            if burnt[k] and residual < 0:
-                weight = 0.0
-                number -= 1.0
-            single = weight * bell
-            square = single * bell
-            lever = single * x
-            lever2 = square * x
-            apart = single * residual
-            w0 += weight
-            e0 += single
-            e1 += lever
-            s0 += square
-            s1 += lever2
-            s2 += lever2 * x
-            r += weight * residual
-            r0 += apart
-            r1 += apart * x
-            misfit += weight * residual * residual
-            if full:
-                x2 = x * x
-                e2 += lever * x
-                s3 += lever2 * x2
-                s4 += lever2 * x2 * x
-                r2 += apart * x2
-            x += 1.0
-            bell *= ratio
-            ratio *= change
-        y2 = y * y
-        normal[0, 0] += w0
+    misfit, number = 0.0, 0.0
+    for k in range(side):
+        x = k - reach - u
+        x2 = x * x
+        e0, e1, s0, s1, s2 = (
+            sums[3 * WIDE + k], sums[4 * WIDE + k], sums[5 * WIDE + k], sums[6 * WIDE + k], sums[7 * WIDE + k],
+        )  # fmt: skip
+        r0, r1 = sums[9 * WIDE + k], sums[10 * WIDE + k]
+        normal[0, 0] += sums[2 * WIDE + k]
         normal[1, 0] += e0
-        normal[2, 0] += e1
-        normal[3, 0] += y * e0
+        normal[2, 0] += x * e0
+        normal[3, 0] += e1
         normal[1, 1] += s0
-        normal[2, 1] += s1
-        normal[3, 1] += y * s0
-        normal[4, 1] += s2
-        normal[5, 1] += y * s1
-        normal[6, 1] += y2 * s0
-        right[0] += r
+        normal[2, 1] += x * s0
+        normal[3, 1] += s1
+        normal[2, 2] += x2 * s0
+        normal[3, 2] += x * s1
+        normal[3, 3] += s2
+        right[0] += sums[8 * WIDE + k]
         right[1] += r0
-        right[2] += r1
-        right[3] += y * r0
+        right[2] += x * r0
+        right[3] += r1
+        misfit += sums[11 * WIDE + k]
+        number += sums[12 * WIDE + k]
         if full:
-            normal[4, 0] += e2
-            normal[5, 0] += y * e1
-            normal[6, 0] += y2 * e0
-            normal[4, 2] += s3
-            normal[5, 2] += y * s2
-            normal[6, 2] += y2 * s1
-            normal[6, 3] += y2 * y * s0
-            normal[4, 4] += s4
-            normal[5, 4] += y * s3
-            normal[6, 4] += y2 * s2
-            normal[6, 5] += y2 * y * s1
-            normal[6, 6] += y2 * y2 * s0
-            right[4] += r2
-            right[5] += y * r1
-            right[6] += y2 * r0
-    normal[2, 2], normal[3, 2], normal[3, 3] = normal[4, 1], normal[5, 1], normal[6, 1]
-    normal[4, 3], normal[5, 3], normal[5, 5] = normal[5, 2], normal[6, 2], normal[6, 4]
+            s3 = sums[14 * WIDE + k]
+            normal[4, 0] += x2 * e0
+            normal[5, 0] += x * e1
+            normal[6, 0] += sums[13 * WIDE + k]
+            normal[4, 2] += x2 * x * s0
+            normal[5, 2] += x2 * s1
+            normal[6, 2] += x * s2
+            normal[6, 3] += s3
+            normal[4, 4] += x2 * x2 * s0
+            normal[5, 4] += x2 * x * s1
+            normal[6, 4] += x2 * s2
+            normal[6, 5] += x * s3
+            normal[6, 6] += sums[15 * WIDE + k]
+            right[4] += x2 * r0
+            right[5] += x * r1
+            right[6] += sums[16 * WIDE + k]
+    if full:
+        normal[4, 1], normal[5, 1], normal[6, 1] = normal[2, 2], normal[3, 2], normal[3, 3]
+        normal[4, 3], normal[5, 3], normal[5, 5] = normal[5, 2], normal[6, 2], normal[6, 4]
     return misfit, number
 
 
@@ -146,12 +160,17 @@ def fit_spots(
     count, size = signal.shape
     bound = int(np.sqrt(size) + 0.5) // 2 - 0.5
     unknowns = 7 if free_shape else 4
-    normal, right = np.zeros((7, 7)), np.zeros(7)
+    side = int(np.sqrt(size) + 0.5)
+    normal, right, sums, square = np.zeros((7, 7)), np.zeros(7), np.zeros(17 * WIDE), np.zeros((side, 3 * WIDE))
     for n in range(count):
         spot, shape = found[n], shapes[n]
+        for k in range(size):
+            row, column = k // side, k % side
+            square[row, column], square[row, WIDE + column] = signal[n, k], weights[n, k]
+            square[row, 2 * WIDE + column] = burnt[n, k]
         misfit, number, scale = 0.0, 0.0, 1.0
         for _ in range(steps):
-            misfit, number = _equations(signal[n], weights[n], burnt[n], spot, shape, free_shape, normal, right)
+            misfit, number = _equations(square, side, spot, shape, free_shape, sums, normal, right)
             for i in range(unknowns):
                 normal[i, i] += 1e-3 * normal[i, i] + 1e-9
             _solve(normal, right, unknowns, False)

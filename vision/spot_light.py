@@ -22,58 +22,82 @@ def lights(
 ) -> None:  # fmt: skip
     """What the laser-on image has more than the laser-off image in a square around each of n peaks (u, v).
 
-    fit (6, p) and basis (p, 6): least squares of a quadratic surface on the p pixels of a square. Written: signal
+    fit (6, p) and basis (6, p): least squares of a quadratic surface on the p pixels of a square. Written: signal
     (n, p) = on minus the raw laser-off image, background (n, p) = the laser-off image minus its quadratic surface,
     slope2 (n, p) = its squared gradient, burnt (n, p), variances (n, 2): of the laser-off image about its surface,
     and of the difference along the border. Without a laser-off image (not `subtracted`) a plane through the border of
     the laser-on image stands for it."""
-    height, width = on.shape
     count, size = signal.shape
     side = int(np.sqrt(size) + 0.5)
     reach = side // 2
     shift_u, shift_v = int(np.floor(-motion[0])), int(np.floor(-motion[1]))
     part_u, part_v = np.float32(-motion[0] - shift_u), np.float32(-motion[1] - shift_v)
-    still = np.empty(size, np.float32)
-    coefficients = np.empty(6, np.float32)
+    still, rest = np.empty((side, side), np.float32), np.empty(size, np.float32)
+    lit, upper, lower = np.empty(side, np.float32), np.empty(side + 1, np.float32), np.empty(side + 1, np.float32)
+    flat, quarter = still.ravel(), np.float32(0.25)
+    f0, f1, f2, f3, f4, f5 = fit[0], fit[1], fit[2], fit[3], fit[4], fit[5]
+    b0, b1, b2, b3, b4, b5 = basis[0], basis[1], basis[2], basis[3], basis[4], basis[5]
     for n in range(count):
-        for k in range(size):
-            v = peaks[n, 1] + k // side - reach
-            u = peaks[n, 0] + k % side - reach
-            light = on[min(max(v, 0), height - 1), min(max(u, 0), width - 1)]
-            burnt[n, k] = light >= BURNT
-            signal[n, k] = light
+        left, top = peaks[n, 0] - reach, peaks[n, 1] - reach
+        for i in range(side):
+            _row(on, top + i, left, lit)
+            row_signal, row_burnt = signal[n, i * side : (i + 1) * side], burnt[n, i * side : (i + 1) * side]
+            for k in range(side):
+                row_signal[k] = lit[k]
+                row_burnt[k] = lit[k] >= BURNT
             if subtracted:
-                top, left = min(max(v + shift_v, 0), height - 1), min(max(u + shift_u, 0), width - 1)
-                value = np.float32(off[top, left])
-                if part_u > 0 or part_v > 0:
-                    low, right = min(max(v + shift_v + 1, 0), height - 1), min(max(u + shift_u + 1, 0), width - 1)
-                    upper = value + part_u * (np.float32(off[top, right]) - value)
-                    lower = np.float32(off[low, left])
-                    lower += part_u * (np.float32(off[low, right]) - lower)
-                    value = upper + part_v * (lower - upper)
-                still[k] = value
+                _row(off, top + i + shift_v, left + shift_u, upper)
+                _row(off, top + i + shift_v + 1, left + shift_u, lower)
+                moved, upper_next, lower_next = still[i], upper[1:], lower[1:]
+                for k in range(side):
+                    high = upper[k] + part_u * (upper_next[k] - upper[k])
+                    low = lower[k] + part_u * (lower_next[k] - lower[k])
+                    moved[k] = high + part_v * (low - high)
+        light = signal[n]
         if not subtracted:
-            _plane_through_border(signal[n], still, side)
+            _plane_through_border(light, flat, side)
+        c0, c1, c2 = np.float32(0), np.float32(0), np.float32(0)
+        c3, c4, c5 = np.float32(0), np.float32(0), np.float32(0)
         for k in range(size):
-            signal[n, k] -= still[k]
-        about = np.float32(0)
-        for j in range(6):
-            total = np.float32(0)
-            for k in range(size):
-                total += fit[j, k] * still[k]
-            coefficients[j] = total
+            value = flat[k]
+            light[k] -= value
+            c0 += f0[k] * value
+            c1 += f1[k] * value
+            c2 += f2[k] * value
+            c3 += f3[k] * value
+            c4 += f4[k] * value
+            c5 += f5[k] * value
         for k in range(size):
-            surface = np.float32(0)
-            for j in range(6):
-                surface += basis[k, j] * coefficients[j]
-            background[n, k] = still[k] - surface
-            about += background[n, k] * background[n, k]
-            row, column = k // side, k % side
-            across = still[k + 1 if column < side - 1 else k] - still[k - 1 if column > 0 else k]
-            down = still[k + side if row < side - 1 else k] - still[k - side if row > 0 else k]
-            slope2[n, k] = np.float32(0.25) * (across * across + down * down)
+            rest[k] = flat[k] - (b0[k] * c0 + b1[k] * c1 + b2[k] * c2 + b3[k] * c3 + b4[k] * c4 + b5[k] * c5)
+        about, ground = np.float32(0), background[n]
+        for k in range(size):
+            ground[k] = rest[k]
+            about += rest[k] * rest[k]
+        for i in range(side):
+            above, here, below = still[max(i - 1, 0)], still[i], still[min(i + 1, side - 1)]
+            before, after, steep = here[:-2], here[2:], slope2[n, i * side : (i + 1) * side]
+            middle, over, under = steep[1:], above[1:], below[1:]
+            for k in range(side - 2):
+                across, down = after[k] - before[k], under[k] - over[k]
+                middle[k] = quarter * (across * across + down * down)
+            for k, across in ((0, here[1] - here[0]), (side - 1, here[side - 1] - here[side - 2])):
+                steep[k] = quarter * (across * across + (below[k] - above[k]) ** 2)
         variances[n, 0] = about / (size - 6)
-        variances[n, 1] = _border_roughness(signal[n], side)
+        variances[n, 1] = _border_roughness(light, side)
+
+
+@compiled
+def _row(image: Image, v: int, left: int, values: Floats) -> None:
+    """The pixels of a row from a column on; the border continues outward."""
+    height, width = image.shape
+    row = image[min(max(v, 0), height - 1)]
+    if left >= 0 and left + len(values) <= width:
+        inside = row[left : left + len(values)]
+        for k in range(len(values)):
+            values[k] = inside[k]
+    else:
+        for k in range(len(values)):
+            values[k] = row[min(max(left + k, 0), width - 1)]
 
 
 @compiled
