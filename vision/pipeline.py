@@ -21,7 +21,7 @@ from vision.lines import smoothed
 from vision.mosaic import demosaiced
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
-from vision.reduction import green, reduce_image, reduction_factor, to_full, tones
+from vision.reduction import green, green_and_tones, reduce_image, reduction_factor, to_full
 from vision.single import observe_photograph
 from vision.spot_paint import without_spots
 from vision.stopwatch import Now, Stopwatch
@@ -70,10 +70,13 @@ class Eye:
                 self._check_size(name, image)
                 images[name] = reduce_image(image, self.factor, self.geometry.bayer)
         watch.lap("reduce")
-        left = find_spots(_green_of(images, "left"), green(images["left_laser"]), self._reachable[0])
+        # of the laser-on images, from here on, what is not green
+        lit, images["left_laser"] = green_and_tones(images["left_laser"])
+        left = find_spots(_green_of(images, "left"), lit, self._reachable[0])
         right = None
         if "right_laser" in images:
-            right = find_spots(_green_of(images, "right"), green(images["right_laser"]), self._reachable[1], left)
+            lit, images["right_laser"] = green_and_tones(images["right_laser"])
+            right = find_spots(_green_of(images, "right"), lit, self._reachable[1], left)
         watch.lap("dots")
         laser = self.geometry.laser
         if laser is None:
@@ -122,8 +125,7 @@ class Eye:
     ) -> BladeObservation:
         factor, camera, laser = self.factor, self._stereo.left, self.geometry.laser
         assert laser is not None
-        still = tones(images["left"]) if "left" in images else None
-        clean = without_spots(tones(images["left_laser"]), still, left)
+        clean = without_spots(images["left_laser"], images.get("left"), left)
         smooth = smoothed(clean)
         seeds = left.uv[blade.left]
         dots = seeds - camera.centre
@@ -136,7 +138,7 @@ class Eye:
         )
         other = None
         if right is not None:
-            other = OtherEye(smoothed(tones(images["right_laser"])), self._stereo, surface)
+            other = OtherEye(smoothed(images["right_laser"]), self._stereo, surface)
         found = find_edges(clean, around, other, expected)
         watch.lap("edges")
         edges = found.edges

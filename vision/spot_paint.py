@@ -19,13 +19,18 @@ REACH = 5  # px, half the square around a spot
 
 
 def without_spots(on: Image, off: Image | None, spots: Spots) -> Image:
-    """A copy of the laser-on image (h, w, c) without its spots: painted over from the laser-off image, moved as
-    `spots.motion` says; without one, each spot as fitted to its surroundings is taken away."""
+    """A copy of the laser-on image's tones (h, w, c) without its spots: painted over from the laser-off image or its
+    tones, moved as `spots.motion` says; without one, each spot as fitted to its surroundings is taken away."""
     clean = np.array(on, order="C")
     if len(spots) == 0:
         return clean
     if off is not None:
-        _paint_from(clean, np.ascontiguousarray(off), np.rint(spots.uv).astype(np.int64), spots.motion)
+        _paint_from(
+            clean,
+            np.ascontiguousarray(off.reshape(*on.shape[:2], -1)),
+            np.rint(spots.uv).astype(np.int64),
+            spots.motion,
+        )
     else:
         _take_away(clean, np.ascontiguousarray(on), spots.uv, spots.shape)
     return clean
@@ -34,6 +39,7 @@ def without_spots(on: Image, off: Image | None, spots: Spots) -> Image:
 @compiled
 def _paint_from(image: Image, off: Image, at: NDArray[np.int64], motion: Array) -> None:
     height, width, channels = image.shape
+    step = 2 if off.shape[2] > channels else 1  # of blue, green and red, the outer ones are the tones
     shift_u, shift_v = int(np.floor(-motion[0])), int(np.floor(-motion[1]))
     part_u, part_v = -motion[0] - shift_u, -motion[1] - shift_v
     for n in range(len(at)):
@@ -42,8 +48,9 @@ def _paint_from(image: Image, off: Image, at: NDArray[np.int64], motion: Array) 
             for u in range(max(at[n, 0] - REACH, 0), min(at[n, 0] + REACH + 1, width)):
                 left, right = min(max(u + shift_u, 0), width - 1), min(max(u + shift_u + 1, 0), width - 1)
                 for c in range(channels):
-                    upper = (1 - part_u) * off[top, left, c] + part_u * off[top, right, c]
-                    lower = (1 - part_u) * off[low, left, c] + part_u * off[low, right, c]
+                    at_c = step * c
+                    upper = (1 - part_u) * off[top, left, at_c] + part_u * off[top, right, at_c]
+                    lower = (1 - part_u) * off[low, left, at_c] + part_u * off[low, right, at_c]
                     image[v, u, c] = np.uint8((1 - part_v) * upper + part_v * lower + 0.5)
 
 
