@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +12,11 @@ from flight.autopilot import AutopilotError, Setpoint
 from mission.behaviours.behaviour import behaviours
 from mission.executive.journal import FORMAT, Entry, read_journal
 from mission.executive.monitors.pilot import STICKS
-from mission.executive.services import Memory, Stretch
+from mission.executive.recollection import UnknownStateError, configuration_of, remembered, station_of
+from mission.executive.services import Memory
 from mission.language import semantics
 from mission.language.semantics import Configuration
-from mission.record.lineage import lineage
+from mission.record.lineage import lineage, untouched
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -47,14 +47,19 @@ class Interrupted:
 
 def last_of(folder: RunFolder, mission: Mission) -> Interrupted:
     """What the newest of the runs that lead up to this one left behind: one that was cut off before its first decision
-    has nothing to say. Nothing anywhere: the mission's beginning.
+    has nothing to say. Where none of them has, nothing was flown yet: the mission's beginning.
 
     Raises:
-        ResumeError, JournalError: as `interrupted`.
+        ResumeError, JournalError: as `interrupted`; or a journal is lost of a run that has flown.
     """
     for run in reversed(lineage(folder)):
-        if run.journal.is_file() and read_journal(run.journal):
+        if run.journal.exists() and read_journal(run.journal):
             return interrupted(run.journal, mission)
+        if not untouched(run):
+            raise ResumeError(
+                f"{run.journal}: {'empty' if run.journal.exists() else 'missing'}, so nobody knows where that run was "
+                "left: look after the vehicle, then fly the mission anew"
+            )
     return Interrupted(semantics.start(mission), Memory(), 0.0)
 
 
@@ -73,21 +78,23 @@ def interrupted(journal: Path, mission: Mission) -> Interrupted:
     if ended == "completed":
         raise ResumeError(f"{journal.parent}: that run came to its end ({ended}); there is nothing to go on with")
     configuration, memory, station = semantics.start(mission), Memory(), None
-    for entry in entries:
-        if entry.kind in ("start", "transition"):
-            configuration = _configuration(entry)
-            station = None
-            if "memory" in entry.fields:
-                memory = remembered(entry.fields["memory"])
-        elif entry.kind == "memory":
-            memory = remembered(entry.fields)
-        elif entry.kind == "progress":
-            station = float(entry.fields["station_m"])
-    if configuration.leaf not in mission.states or mission.states[configuration.leaf].children:
-        raise ResumeError(
-            f"{journal.parent}: it was left in {configuration.leaf}, which {mission.path.name} does not have; "
-            "go on with the mission that was flown"
-        )
+    for number, entry in enumerate(entries, 1):
+        try:
+            if entry.kind in ("start", "transition"):
+                configuration, station = configuration_of(entry, mission), None
+                if "memory" in entry.fields:
+                    memory = remembered(entry.fields["memory"])
+            elif entry.kind == "memory":
+                memory = remembered(entry.fields)
+            elif entry.kind == "progress":
+                station = station_of(entry)
+        except UnknownStateError as unknown:
+            raise ResumeError(
+                f"{journal.parent}: it was in {unknown}, which {mission.path.name} does not have; "
+                "go on with the mission that was flown"
+            ) from None
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise ResumeError(f"{journal}:{number}: this {entry.kind} line was damaged or edited") from error
     if ended is not None:
         configuration, station = semantics.start(mission), None
     return Interrupted(configuration, memory, entries[-1].t, station, ended, journal.parent)
@@ -172,17 +179,6 @@ async def take_up(services: Services, mission: Mission, configuration: Configura
         services.raise_event("vision_lost", resumed=True)
 
 
-def remembered(recorded: Mapping[str, Any]) -> Memory:
-    """Memory as a journal's line has it; names that are not known any more are passed over."""
-    known = {entry.name: recorded[entry.name] for entry in fields(Memory) if entry.name in recorded}
-    for name in ("home", "hub"):
-        if known.get(name) is not None:
-            north, east, down = known[name]
-            known[name] = (float(north), float(east), float(down))
-    known["inspected"] = {side: Stretch(**stretch) for side, stretch in known.get("inspected", {}).items()}
-    return Memory(**known)
-
-
 def check_format(journal: Path, entries: tuple[Entry, ...]) -> None:
     """Refuse what this program cannot read.
 
@@ -195,8 +191,3 @@ def check_format(journal: Path, entries: tuple[Entry, ...]) -> None:
     found = first.fields.get("format")
     if found != FORMAT:
         raise ResumeError(f"{journal}:1: written in format {found}, this program reads format {FORMAT}")
-
-
-def _configuration(entry: Entry) -> Configuration:
-    leaf = entry.fields["to"] if entry.kind == "transition" else entry.fields["state"]
-    return Configuration(str(leaf), dict(entry.fields.get("history", {})), dict(entry.fields.get("taken", {})))

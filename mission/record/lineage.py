@@ -56,3 +56,17 @@ def lineage(folder: RunFolder) -> tuple[RunFolder, ...]:
         seen.add(path.resolve())
         found.insert(0, RunFolder(path))
     return tuple(found)
+
+
+def untouched(folder: RunFolder) -> bool:
+    """Whether a run was begun, and cut off before it could do anything: no setpoint was sent, nothing was found out,
+    no picture was taken."""
+    traces = [folder.summary, folder.path / "knowledge.json"]
+    try:
+        begun = b"run_created" in folder.log.read_bytes()
+        setpoints = folder.telemetry / "setpoints.csv"
+        sent = setpoints.exists() and setpoints.read_bytes().count(b"\n") > 1
+        pictures = any(path.stat().st_size for path in folder.frames.iterdir())
+    except OSError:
+        return False
+    return begun and not (sent or pictures or any(path.exists() for path in traces))

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from mission.executive.executive import Executive
 from mission.executive.journal import JournalError, read_journal
+from mission.executive.recollection import remembered
 from mission.executive.replay import Played, replay
-from mission.executive.resume import ResumeError, interrupted, last_of, remembered, where
+from mission.executive.resume import ResumeError, interrupted, last_of, where
 from mission.executive.services import Memory, Stretch
 from mission.language.semantics import Configuration
 
@@ -172,14 +173,15 @@ def test_a_landing_is_over_on_the_ground_and_only_flying_begins_anew(fly: Any, m
 
 
 def test_of_several_runs_the_newest_that_decided_anything_is_gone_on_with(fly: Any, tmp_path: Path) -> None:
-    from mission.record.folder import RunFolder
+    from mission.record.folder import RunFolder, log_line
     from mission.record.lineage import RunNote
 
     first = killed_at(fly, 7.0)
     folders = [RunFolder(tmp_path / name) for name in ("one", "two", "three")]
     for folder, before in zip(folders, (None, "one", "two"), strict=True):
-        folder.path.mkdir()
+        folder.frames.mkdir(parents=True)
         folder.mission.write_text("mission: test\n")
+        log_line(folder, "run_created")
         RunNote(continues=before).write(folder)
     assert last_of(folders[2], first.mission).configuration.leaf == "start"
     folders[0].journal.write_bytes(first.path.read_bytes())
@@ -187,6 +189,66 @@ def test_of_several_runs_the_newest_that_decided_anything_is_gone_on_with(fly: A
     past = last_of(folders[2], first.mission)
     assert past.configuration.leaf == "inspect.trailing" and past.folder == folders[0].path
     assert past.memory.passes_done == ["leading"]
+
+
+@pytest.mark.parametrize(
+    "trace", ["knowledge.json", "summary.json", "telemetry/setpoints.csv", "frames/00001_left.jpg"]
+)
+@pytest.mark.parametrize("journal", [None, b"", b'{"seq": 0, "t": 0.0, "ki'])
+def test_a_run_that_did_something_and_lost_its_journal_is_refused(
+    fly: Any, tmp_path: Path, trace: str, journal: bytes | None
+) -> None:
+    from mission.record.folder import create
+
+    folder = create(tmp_path / "logs", "test", "mission: test\n", 0)
+    mission = fly(INSPECTION, PASSES).mission
+    if journal is not None:
+        folder.journal.write_bytes(journal)
+    assert last_of(folder, mission).configuration.leaf == "start"
+    (folder.path / trace).write_text("wall_s,t\n1.0,2.0\n")
+    with pytest.raises(ResumeError, match=f"journal.jsonl: {'empty' if journal is not None else 'missing'}"):
+        last_of(folder, mission)
+
+
+def test_a_folder_that_this_program_never_began_is_refused(fly: Any, tmp_path: Path) -> None:
+    from mission.record.folder import RunFolder
+
+    (tmp_path / "made").mkdir()
+    with pytest.raises(ResumeError, match=r"journal.jsonl: missing"):
+        last_of(RunFolder(tmp_path / "made"), fly(INSPECTION, PASSES).mission)
+    (tmp_path / "made" / "journal.jsonl").mkdir()
+    with pytest.raises(JournalError, match="a plain file"):
+        last_of(RunFolder(tmp_path / "made"), fly(INSPECTION, PASSES).mission)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '"kind": "start", "format": 1',
+        '"kind": "start", "format": 1, "state": ["start"]',
+        '"kind": "start", "format": 1, "state": "start", "history": [1]',
+        '"kind": "start", "format": 1, "state": "start", "taken": {"a": -1}',
+        '"kind": "start", "format": 1, "state": "start", "memory": 7',
+        '"kind": "start", "format": 1, "state": "start", "memory": {"home": [1]}',
+        '"kind": "start", "format": 1, "state": "start", "memory": {"heading": Infinity}',
+        '"kind": "start", "format": 1, "state": "start", "memory": {"inspected": {"leading": {"from": 1}}}',
+        '"kind": "start", "format": 1, "state": "start"}\n{"seq": 1, "t": 1.0, "kind": "progress", "station_m": "x"',
+    ],
+)
+def test_lines_that_somebody_damaged_are_named(fly: Any, tmp_path: Path, line: str) -> None:
+    path = tmp_path / "damaged.jsonl"
+    path.write_text(f'{{"seq": 0, "t": 0.0, {line}}}\n')
+    with pytest.raises(ResumeError, match=r"damaged.jsonl:\d: this \w+ line was damaged or edited"):
+        interrupted(path, fly(INSPECTION, PASSES).mission)
+
+
+def test_history_of_a_state_that_the_mission_lacks_is_refused(fly: Any, tmp_path: Path) -> None:
+    path = tmp_path / "other.jsonl"
+    path.write_text(
+        '{"seq":0,"t":0.0,"kind":"start","format":1,"state":"start","history":{"inspect":"inspect.gone"}}\n'
+    )
+    with pytest.raises(ResumeError, match=r"in inspect.gone, which \S+ does not have"):
+        interrupted(path, fly(INSPECTION, PASSES).mission)
 
 
 def interrupted_in(mission: Any, leaf: str) -> Any:

@@ -113,10 +113,11 @@ def fly(
 
 def write_journal(folder: RunFolder, until_s: float = 1e9, goes_on_in: str | None = None) -> None:
     """The journal of a completed flight, or its beginning; or what follows after `until_s`, going on in a state."""
-    lines = [line for line in JOURNAL if line["t"] <= until_s]
+    keyed = [line | ({"key": f"{line['from']}:{line['event']}"} if "from" in line else {}) for line in JOURNAL]
+    lines = [line for line in keyed if line["t"] <= until_s]
     if goes_on_in is not None:
         begins = {**JOURNAL[0], "t": until_s, "resumed": True, "state": goes_on_in}
-        lines = [begins, *(line for line in JOURNAL if line["t"] > until_s)]
+        lines = [begins, *(line for line in keyed if line["t"] > until_s)]
     folder.journal.write_text("".join(json.dumps({"seq": i, **line}) + "\n" for i, line in enumerate(lines)), "utf-8")
 
 
