@@ -22,6 +22,7 @@ from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
 from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
 from vision.observation import Edge, Line
+from vision.unwitnessed import parts_unlike, witnessed
 
 Array = NDArray[Any]  # of floats
 
@@ -59,9 +60,10 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smooth, noise, other)
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
-    chosen = _choose([c for c in candidates if not _hides_nothing(c, candidates, blade)], blade, largest)
+    believed = [c for c in candidates if witnessed(c, blade.dots) or parts_unlike(c, blade, smooth)]
+    chosen = _choose([c for c in believed if not _hides_nothing(c, candidates, blade)], blade, largest)
     if len(chosen) == 1:
-        chosen = with_partner(chosen[0], candidates, blade, largest)
+        chosen = with_partner(chosen[0], believed, blade, largest)
     ending = None
     axis = float("nan") if expected is None else expected % np.pi
     closed = None
