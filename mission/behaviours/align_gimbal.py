@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
@@ -30,6 +29,8 @@ class AlignGimbal(Parameters):
 )
 async def align_gimbal(services: Services, parameters: AlignGimbal) -> str:
     """Hold at the standoff, bring the edge into view, and point the gimbal along the surface's normal."""
+    import numpy as np
+
     from mission.behaviours.following import Following
 
     following = Following(services, side=parameters.side, toward="tip", standoff_m=parameters.standoff_m)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import Field
 
-from flight.autopilot import Setpoint
-from flight.guidance.follow import LONGEST_TICK_S
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import approach, fly_to
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from mission.executive.services import Memory, Services
     from vision.estimate import BladeEstimate
 
@@ -47,6 +46,11 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
 
     Until the cameras measure the blade, the range finder limits how near the vehicle goes.
     """
+    import numpy as np
+
+    from flight.autopilot import Setpoint
+    from flight.guidance.follow import LONGEST_TICK_S
+
     turbine = services.turbine
     frame = turbine.blade_frame()
     ahead = turbine.axes()[0] * np.array([1.0, 1.0, 0.0])
@@ -96,6 +100,8 @@ async def approach_root(services: Services, parameters: ApproachRoot) -> str:
 
 def goes_on_at(memory: Memory, root_m: float, tip_m: float) -> tuple[float, float]:
     """Station and offset (m, blade frame) at which the inspection goes on; at the root where it has yet to begin."""
+    import numpy as np
+
     begun = [side for side in memory.inspected if side not in memory.passes_done]
     done = [side for side in memory.inspected if side in memory.passes_done]
     if not begun and (not done or len(done) > 1):

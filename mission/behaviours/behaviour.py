@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import pkgutil
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict
@@ -80,8 +80,10 @@ def behaviour(
 
 @cache
 def behaviours() -> Mapping[str, Behaviour]:
-    """Every behaviour of the package, by name: each module beside this one is imported, so adding a file is enough."""
+    """Every behaviour of the package, by name. Each module beside this one that declares some is imported, so adding a
+    file is enough; what only flying needs (numpy, guidance, vision) such a module imports in its functions."""
     package = __name__.rpartition(".")[0]
-    for module in pkgutil.iter_modules(importlib.import_module(package).__path__):
-        importlib.import_module(f"{package}.{module.name}")
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        if "\n@behaviour(" in path.read_text("utf-8"):
+            importlib.import_module(f"{package}.{path.stem}")
     return dict(sorted(_REGISTRY.items()))

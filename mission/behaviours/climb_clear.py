@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
@@ -24,6 +23,8 @@ class ClimbClear(Parameters):
 @behaviour(outcomes={"done": "the straight way home is free"}, parameters=ClimbClear)
 async def climb_clear(services: Services, parameters: ClimbClear) -> str:
     """Climb above the rotor, further from it first, if the straight way home would pass through the keep-out volume."""
+    import numpy as np
+
     if not await engage(services):
         return "done"
     home = np.array(services.memory.home or (0.0, 0.0, 0.0))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import Field
 
-from flight.autopilot import Setpoint
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import fly_to
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from mission.executive.services import Services
 
 
@@ -39,6 +39,10 @@ MOST_CORRECTION_M = 4.0  # a survey that is wrong by more is not corrected but e
 )
 async def climb_tower(services: Services, parameters: ClimbTower) -> str:
     """Fly in front of the tower and climb along it at a distance that the range finder holds. Needs no laser."""
+    import numpy as np
+
+    from flight.autopilot import Setpoint
+
     turbine = services.turbine
     home = np.array(services.memory.home or (0.0, 0.0, 0.0))
     ahead = turbine.axes()[0] * np.array([1.0, 1.0, 0.0])

@@ -8,7 +8,6 @@ from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import stay
-from vision.landmarks import agreed_tip
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -31,6 +30,8 @@ class ConfirmTip(Parameters):
 )
 async def confirm_tip(services: Services, parameters: ConfirmTip) -> str:
     """Stop and look again: enough sightings must agree with each other and with the blade's length."""
+    from vision.landmarks import agreed_tip
+
     stay(services)
     started = services.clock.now()
     while services.clock.now() - started < parameters.patience_s:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.executive.services import Stretch
-from vision.landmarks import RootWatch, agreed_tip
 
 if TYPE_CHECKING:
     from mission.executive.services import Memory, Services
     from vision.estimate import BladeEstimate
+    from vision.landmarks import RootWatch
 
 
 class FollowEdge(Parameters):
@@ -50,7 +48,10 @@ async def follow_edge(services: Services, parameters: FollowEdge) -> str:
 
     On two edges where both fit into the view, on one where not, back over the edge where the camera has slipped off it.
     """
+    import numpy as np
+
     from mission.behaviours.following import Following
+    from vision.landmarks import RootWatch, agreed_tip
 
     perception = services.perception
     following = Following(
@@ -100,6 +101,8 @@ def done(services: Services, parameters: FollowEdge) -> None:
 
 def note_progress(memory: Memory, parameters: FollowEdge, station_m: float, edge_m: float) -> None:
     """Remember how far the pass has come, in steps; one that goes on in the same direction is the same pass."""
+    from mission.executive.services import Stretch
+
     travel = 1.0 if parameters.toward == "tip" else -1.0
     before = memory.inspected.get(parameters.side)
     if before is None or (before.to_m - before.from_m) * travel < 0:

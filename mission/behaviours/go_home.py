@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
@@ -24,6 +23,8 @@ class GoHome(Parameters):
 @behaviour(outcomes={"done": "over the take-off point, ready to land"}, parameters=GoHome)
 async def go_home(services: Services, parameters: GoHome) -> str:
     """Fly to above the take-off point and descend: straight where the way is free. Needs no images."""
+    import numpy as np
+
     services.perception.watch_blade(False)
     if not await engage(services):
         return "done"

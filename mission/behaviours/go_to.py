@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
@@ -27,6 +26,8 @@ class GoTo(Parameters):
 @behaviour(outcomes={"arrived": "at the place, nearly at rest"}, parameters=GoTo)
 async def go_to(services: Services, parameters: GoTo) -> str:
     """Fly a straight line to a place relative to the take-off point. Needs no images."""
+    import numpy as np
+
     if not await engage(services):
         return "arrived"
     home = np.array(services.memory.home or (0.0, 0.0, 0.0))

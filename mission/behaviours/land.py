@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flight.autopilot import AutopilotError
 from mission.behaviours.behaviour import NoParameters, behaviour
 
 if TYPE_CHECKING:
@@ -21,6 +20,8 @@ async def land(services: Services, parameters: NoParameters) -> str:
     Once it was seen landing it is not asked again: who ends that landing wants the vehicle. Nor is a vehicle that
     somebody else flies; the monitors say so, and end this.
     """
+    from flight.autopilot import AutopilotError
+
     autopilot, commanded = services.autopilot, services.commanded
     services.perception.watch_blade(False)
     if not commanded.took_over:
@@ -47,6 +48,8 @@ async def land(services: Services, parameters: NoParameters) -> str:
 
 async def leave_landed(services: Services) -> None:
     """Put it on hold: on the ground the autopilot is back in the mode it landed from, and refuses to arm in that."""
+    from flight.autopilot import AutopilotError
+
     if services.autopilot.telemetry.flight_mode not in NOT_TO_ARM_IN:
         return
     try:

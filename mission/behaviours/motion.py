@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from flight.autopilot import Setpoint
-
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from flight.autopilot import Setpoint
     from mission.executive.services import Services
 
-Array = NDArray[np.float64]
+    Array = NDArray[np.float64]
+
 LEASH_S = 2.5  # the target runs at most this far ahead of the vehicle, in seconds of the wanted speed
-YAW_RATE = np.deg2rad(30.0)
+YAW_RATE = math.radians(30.0)
 
 
 def wrap(angle: float) -> float:
     """The same angle in [-π, π)."""
+    import numpy as np
+
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def target_or_here(services: Services) -> Setpoint:
     """The present target of the setpoint stream, or where the vehicle is."""
+    from flight.autopilot import Setpoint
+
     if services.setpoints.target is not None:
         return services.setpoints.target
     pose = services.autopilot.telemetry.pose
@@ -33,6 +38,10 @@ def target_or_here(services: Services) -> Setpoint:
 def stay(services: Services) -> Setpoint:
     """Hold the present position and yaw from now on, or the last target where they are not known; returns the
     setpoint."""
+    import numpy as np
+
+    from flight.autopilot import Setpoint
+
     pose, last = services.autopilot.telemetry.pose, services.setpoints.target
     if last is not None and not (np.isfinite(pose.position).all() and np.isfinite(pose.attitude[2])):
         return last
@@ -49,6 +58,8 @@ async def engage(services: Services) -> bool:
     Raises:
         AutopilotError: OFFBOARD was refused.
     """
+    from flight.autopilot import Setpoint
+
     telemetry = services.autopilot.telemetry
     if services.streaming:
         return telemetry.in_air or telemetry.armed
@@ -76,6 +87,10 @@ async def fly_to(
     The target slides along the line at `speed_m_s`, never more than a leash ahead of the vehicle. The keep-out volume
     still bounds every setpoint: a place inside it is never reached, and the state's deadline ends the attempt.
     """
+    import numpy as np
+
+    from flight.autopilot import Setpoint
+
     if not await engage(services):
         return
     last = services.clock.now()
@@ -102,6 +117,8 @@ async def fly_to(
 
 def approach(here: Array, there: Array, step_m: float) -> Array:
     """The point `step_m` from `here` on the way to `there`, or `there` when it is nearer."""
+    import numpy as np
+
     way = there - here
     length = float(np.linalg.norm(way))
     result: Array = there.copy() if length <= step_m else here + way * (step_m / length)
@@ -111,6 +128,8 @@ def approach(here: Array, there: Array, step_m: float) -> Array:
 def line_of_sight(services: Services) -> Array:
     """Unit vector (3,), horizontal, from the vehicle toward the turbine: the camera's when it looks that way, else the
     turbine's own axis. Needs no image."""
+    import numpy as np
+
     yaw = float(services.autopilot.telemetry.pose.gimbal[0])
     sight = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     axis = np.array([np.cos(services.turbine.heading), np.sin(services.turbine.heading), 0.0])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
@@ -26,6 +25,8 @@ class NextBlade(Parameters):
 )
 async def next_blade(services: Services, parameters: NextBlade) -> str:
     """Choose the next blade clockwise: what is known of the hub holds for it, what was seen of the last does not."""
+    import numpy as np
+
     stay(services)
     memory = services.memory
     services.perception.watch_blade(False)

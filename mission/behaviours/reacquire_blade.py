@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
-from flight.autopilot import Setpoint
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import line_of_sight, stay
 
@@ -29,6 +28,8 @@ class ReacquireBlade(Parameters):
 )
 async def reacquire_blade(services: Services, parameters: ReacquireBlade) -> str:
     """Stop, back off a little along the line of sight, and wait until the blade has been tracked again for a while."""
+    from flight.autopilot import Setpoint
+
     here = stay(services)
     services.perception.watch_blade(True)
     services.setpoints.target = Setpoint(here.position - line_of_sight(services) * parameters.back_m, here.yaw)

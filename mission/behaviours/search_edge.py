@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from pydantic import Field
 
-from flight.autopilot import Setpoint
-from flight.guidance.follow import LONGEST_TICK_S
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import approach, stay
 
@@ -32,6 +29,11 @@ class SearchEdge(Parameters):
 )
 async def search_edge(services: Services, parameters: SearchEdge) -> str:
     """Back off a little, then sweep across the blade, first to the side where the edge was seen last."""
+    import numpy as np
+
+    from flight.autopilot import Setpoint
+    from flight.guidance.follow import LONGEST_TICK_S
+
     across = services.turbine.blade_frame().across
     outward = across if parameters.side == "leading" else -across
     depth = services.turbine.blade_frame().depth

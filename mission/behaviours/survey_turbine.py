@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import fly_to, wrap
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from mission.executive.perception import FarSight
     from mission.executive.services import Services
 
@@ -42,6 +43,8 @@ SMALLEST = 0.45  # a small rotor is looked at from nearer, but never from beside
 )
 async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
     """Picture the rotor from several places in front of it, intersect the views, and correct what the survey said."""
+    import numpy as np
+
     sights: list[FarSight] = []
     for place in _viewpoints(services, parameters):
         sight = services.turbine.hub - place
@@ -81,6 +84,8 @@ async def survey_turbine(services: Services, parameters: SurveyTurbine) -> str:
 
 def _viewpoints(services: Services, parameters: SurveyTurbine) -> list[np.ndarray]:
     """Places (3,) in local NED: two far ones on either side of the axis, then a near one on it."""
+    import numpy as np
+
     turbine = services.turbine
     x, y, _ = turbine.axes()
     scale = min(1.0, max(SMALLEST, turbine.tip_radius_m / USUAL_RADIUS_M))

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
-from flight.autopilot import AutopilotError, Setpoint
 from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import fly_to
 
 if TYPE_CHECKING:
+    from flight.autopilot import Setpoint
     from mission.executive.services import Services
 
 
@@ -36,6 +36,8 @@ async def take_off(services: Services, parameters: TakeOff) -> str:
     A vehicle that is in the air already, as after an interruption, climbs the rest under setpoints; home stays where it
     took off.
     """
+    from flight.autopilot import AutopilotError, Setpoint
+
     autopilot = services.autopilot
     ground = autopilot.telemetry.pose.position.copy()
     home = services.memory.home
@@ -88,6 +90,8 @@ async def _climbed(services: Services, ground: float, height_m: float) -> bool:
 
 async def _climb_on(services: Services, here: Setpoint, down: float) -> str:
     """The rest of a climb that was interrupted, to `down` m in local NED; never downward."""
+    from flight.autopilot import AutopilotError
+
     above = here.position.copy()
     above[2] = min(down, float(here.position[2]))
     try:

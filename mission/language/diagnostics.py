@@ -46,10 +46,10 @@ class Diagnostic:
     def as_annotation(self) -> str:
         """A workflow command with which GitHub marks the line in a pull request."""
         text = f"{self.code} {printable(self.message)}" + (f" ({printable(self.hint)})" if self.hint else "")
-        text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+        file = printable(self.location.file).replace("%", "%25").replace(":", "%3A").replace(",", "%2C")
         return (
-            f"::{self.level} file={self.location.file},line={max(self.location.line, 1)},"
-            f"col={max(self.location.column, 1)},title={self.code}::{text}"
+            f"::{self.level} file={file},line={max(self.location.line, 1)},"
+            f"col={max(self.location.column, 1)},title={self.code}::{text.replace('%', '%25')}"
         )
 
 

@@ -47,6 +47,8 @@ STEP = {
     "delayed_s": "the transition must be delayed by so many seconds",
 }
 
+LONGEST_S = 86_400.0  # a day: longer than anything flies
+
 
 def read(path: Path) -> tuple[ScenarioFile | None, tuple[Diagnostic, ...]]:
     """A scenario file, None with findings if it, or its mission, is wrong."""
@@ -162,9 +164,14 @@ class _Reader:
             if key in fields and (not isinstance(value, types) or (isinstance(value, bool) and bool not in types)):
                 self.report(places[key], f"{key}: {STEP[key]}; not {value!r}")
                 fields.pop(key)
-        for name in fields.get("given", {}):
+            elif types == (int, float) and key in fields and not 0 <= value <= LONGEST_S:
+                self.report(places[key], f"{key}: {STEP[key]}; not {value:g}", f"0 to {LONGEST_S:g}")
+                fields.pop(key)
+        for name, value in fields.get("given", {}).items():
             if name not in keys():
                 self.report(places["given"], f"there is no quantity {name!r}", near_or_choices(name, keys()))
+            elif value is not None and not (isinstance(value, int | float) and abs(value) < float("inf")):
+                self.report(places["given"], f"{name} is a number, true, false or null, not {value!r}")
 
     def report(self, place: Location, message: str, hint: str = "") -> None:
         self.problems.append(Diagnostic(place, "M501", message, hint))

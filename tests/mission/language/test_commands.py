@@ -50,6 +50,14 @@ def test_findings_are_printed_as_compilers_do_as_json_and_as_annotations(
     assert code == 2 and out.splitlines()[0].startswith(f"::error file={path},line={line},col=")
 
 
+def test_an_annotation_s_file_cannot_be_taken_for_its_other_properties() -> None:
+    from mission.language.diagnostics import Diagnostic
+    from mission.language.location import Location
+
+    said = Diagnostic(Location("a,line=9:b\n::c.yaml", 1, 2), "M203", "100 % wrong").as_annotation()
+    assert said == "::error file=a%2Cline=9%3Ab\\n%3A%3Ac.yaml,line=1,col=2,title=M203::M203 100 %25 wrong"
+
+
 def test_scenario_files_can_be_validated_like_missions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert output(capsys, "validate", str(MISSIONS / "scenarios" / "square.scenario.yaml"))[0] == 0
     path = written(tmp_path, "mission: small.yaml\nscenarios: {a: [{stat: home}]}\n", "small.scenario.yaml")
@@ -116,6 +124,7 @@ def test_a_diagram_is_written_where_it_is_asked_for(tmp_path: Path, capsys: pyte
 def test_validating_imports_nothing_heavy() -> None:
     heavy = (
         "cv2",
+        "numpy",
         "numba",
         "scipy",
         "filterpy",
