@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from vision.blade_motion import (
     TREMBLE,
     TWIST,
     Side,
+    alike_across_m,
     alike_m,
     curvature_sigmas,
     led_to,
@@ -175,9 +177,11 @@ def measure(
             along, across = dots[:, :2].mean(axis=0) - reference
             slope = led_to(along, alike_m(model.station, settings))[1]
             H[1, [DEPTH_CURVATURE, TWIST]] = slope, across
-            H[2, [TWIST, ACROSS_CURVATURE]] = slope, led_to(across, settings.alike_across_m)[1]
-    bend = settings.surface_bend * curvature_sigmas(model.station, settings)[ACROSS_CURVATURE] * spread
-    left_out = [np.hypot(settings.surface_sigma_m, bend * spread)]
+            H[2, [TWIST, ACROSS_CURVATURE]] = slope, led_to(across, alike_across_m(model.station, settings))[1]
+    near_root = partial(np.interp, model.station, settings.round_within_m)
+    camber = curvature_sigmas(model.station, settings)[ACROSS_CURVATURE]
+    bend = float(near_root(settings.surface_bend)) * camber * spread
+    left_out = [np.hypot(settings.surface_sigma_m, bend * spread / 4)]
     left_out += [settings.surface_slope_sigma, np.hypot(settings.surface_slope_sigma, bend)][: size - 1]
     parts = {"surface": slice(0, size)}
     for i, side in enumerate(sides):
@@ -191,7 +195,7 @@ def measure(
         H[rows, curvature] = place + length**2 / 24, slope
         H[rows, TREMBLE] = shift[start : start + 2] - by_plane[rows] @ shift[PLANE]
         H[rows, PLANE] = -by_plane[rows]
-        left_out += [settings.edge_sigma_m, settings.edge_slope_sigma]
+        left_out += [float(near_root(settings.edge_sigma_m)), float(near_root(settings.edge_slope_sigma))]
         H[rows, RECESS[side]] = -by_plane[rows, 0]
         parts[side] = rows
     if size == 1:

@@ -59,6 +59,11 @@ def alike_m(station: float, settings: TrackerSettings) -> float:
     return float(np.interp(station, settings.round_within_m, settings.alike_m))
 
 
+def alike_across_m(station: float, settings: TrackerSettings) -> float:
+    """Over how many metres across the blade its curvature is like itself at a station."""
+    return float(np.interp(station, settings.round_within_m, settings.alike_across_m))
+
+
 def recess_sigma(station: float, settings: TrackerSettings) -> float:
     """Sigma (m) of how far behind the surface an edge lies."""
     return float(np.interp(station, settings.round_within_m, settings.recess_m))
@@ -76,7 +81,8 @@ def travel(along: float, across: float, station: float, settings: TrackerSetting
     """Φ (20, 20) of a reference point that moves by `along` metres of station, to this one, and `across` metres of
     offset."""
     place, slope, left = led_to(along, alike_m(station, settings))
-    bulge, lean, kept = led_to(across, settings.alike_across_m)
+    bulge, lean, kept = led_to(across, alike_across_m(station, settings))
+    shrunk = shrinking(along, station, settings)
     transition = np.eye(SIZE)
     transition[DEPTH, [DEPTH_SLOPE, ACROSS_SLOPE]] = along, across
     transition[DEPTH, [DEPTH_CURVATURE, TWIST, ACROSS_CURVATURE]] = place, slope * across, bulge
@@ -86,12 +92,22 @@ def travel(along: float, across: float, station: float, settings: TrackerSetting
         start, curvature = EDGE[side].start, EDGE_CURVATURE[side]
         transition[start, [start + 1, curvature]] = along, place
         transition[start + 1, curvature] = slope
-        transition[curvature, curvature] = left
-        transition[RECESS[side], RECESS[side]] = left
-    for curvature in (DEPTH_CURVATURE, TWIST):
-        transition[curvature, curvature] = left
-    transition[ACROSS_CURVATURE, ACROSS_CURVATURE] = left * kept
+        transition[RECESS[side], RECESS[side]] = left * shrunk[RECESS[side]]
+    for curvature in (DEPTH_CURVATURE, TWIST, *EDGE_CURVATURE.values()):
+        transition[curvature, curvature] = left * shrunk[curvature]
+    transition[ACROSS_CURVATURE, ACROSS_CURVATURE] = left * kept * shrunk[ACROSS_CURVATURE]
     return transition
+
+
+def shrinking(along: float, station: float, settings: TrackerSettings) -> dict[int, float]:
+    """What is left of each curvature and recess on the way to a station because blades have less of it there: what
+    bends a root says nothing of the bend farther out. Where they have more, noise alone adds it."""
+    here, before = _sigmas(station, settings), _sigmas(station - along, settings)
+    return {value: min(sigma / before[value], 1.0) for value, sigma in here.items()}
+
+
+def _sigmas(station: float, settings: TrackerSettings) -> dict[int, float]:
+    return curvature_sigmas(station, settings) | dict.fromkeys(RECESS.values(), recess_sigma(station, settings))
 
 
 def carried(mean: Array, lens: Array) -> Array:
@@ -105,15 +121,17 @@ def carried(mean: Array, lens: Array) -> Array:
 def travel_noise(along: float, across: float, station: float, settings: TrackerSettings) -> Array:
     """Q (20, 20) of moving the reference to a station: curvatures change, and with them what they lead to."""
     noise = np.zeros((SIZE, SIZE))
-    sigmas = curvature_sigmas(station, settings)
     chain = wandered(along, alike_m(station, settings))
+    fresh = max(float(chain[2, 2]), 1e-12)
+    here, before = _sigmas(station, settings), _sigmas(station - along, settings)
+    # So much that each is as large here as blades have it, whatever it was before.
+    added = {v: here[v] ** 2 - (1 - fresh) * min(here[v], before[v]) ** 2 for v in here}
     for rows, columns, curvature in _CHAINS:
-        noise[rows, columns] += sigmas[curvature] ** 2 * chain
-    noise[_TWISTS] += sigmas[TWIST] ** 2 * chain[1:, 1:]
-    noise[_CAMBER] += sigmas[ACROSS_CURVATURE] ** 2 * wandered(across, settings.alike_across_m)
-    noise[ACROSS_CURVATURE, ACROSS_CURVATURE] += sigmas[ACROSS_CURVATURE] ** 2 * chain[2, 2]
-    for recess in RECESS.values():
-        noise[recess, recess] += recess_sigma(station, settings) ** 2 * chain[2, 2]
+        noise[rows, columns] += added[curvature] / fresh * chain
+    noise[_TWISTS] += added[TWIST] / fresh * chain[1:, 1:]
+    noise[_CAMBER] += here[ACROSS_CURVATURE] ** 2 * wandered(across, alike_across_m(station, settings))
+    for value in (ACROSS_CURVATURE, *RECESS.values()):
+        noise[value, value] += added[value]
     return noise
 
 

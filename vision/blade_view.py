@@ -13,6 +13,7 @@ from vision.camera import Camera
 from vision.capture import CameraPose
 from vision.estimate import BladeEstimate, BladeFrame, SideEstimate
 from vision.observation import Line
+from vision.tracker_settings import TrackerSettings
 
 Array = NDArray[np.float64]
 REACH_M = 4.0  # an edge is drawn where it lies within this much of station of the point that is looked at
@@ -25,13 +26,14 @@ def view(
     camera: Camera,
     stamp_s: float,
     ages: Mapping[str, float],
-    left_out_m: float = 0.0,
+    settings: TrackerSettings,
 ) -> BladeEstimate:
     """The estimate at the model's reference point, which must lie where the camera looks (see `look_at`).
 
-    ages: seconds since 'surface' and each side were last seen; a side without one has not been seen. left_out_m: sigma
-    of the surface around the modelled plane. What is seen from the lens (distances, lines) is as the camera shows it at
-    this moment; what lies in local NED is without the trembling of the vehicle's position.
+    ages: seconds since 'surface' and each side were last seen; a side without one has not been seen. The distance's
+    sigma allows for the surface around the modelled plane, and for what is wrong with all dots together. What is seen
+    from the lens (distances, lines) is as the camera shows it at this moment; what lies in local NED is without the
+    trembling of the vehicle's position.
     """
     shown = model.as_shown()
     depth, along, across = model.mean[PLANE]
@@ -41,7 +43,9 @@ def view(
     gradient = np.array([-along, -across, 1.0])
     steepness = max(float(axis @ gradient), 0.1)
     distance = float(np.linalg.norm(np.array([model.station, model.offset, shown.mean[DEPTH]]) - lens))
-    distance_sigma = float(np.hypot(np.sqrt(shown.covariance[DEPTH, DEPTH]), left_out_m)) / steepness
+    together = float(np.interp(model.station, settings.round_within_m, settings.dots_per_m)) * distance**2
+    left_out = np.square([settings.surface_sigma_m, together]).sum()
+    distance_sigma = float(np.sqrt(shown.covariance[DEPTH, DEPTH] + left_out)) / steepness
     seen = {side: ages[side] for side in SIDES if side in ages}
     point = frame.to_ned(here)
     direction, sigma = heading(shown, seen, frame, pose)

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.blade_gate import BladeGate, UpdateResult
+from vision.blade_edges import EdgeRivals, impossible
+from vision.blade_gate import BladeGate, Judged, UpdateResult
 from vision.blade_measurement import look_at
 from vision.blade_model import BladeModel, prior
-from vision.blade_motion import EDGE, PLANE, SIDES, Side
+from vision.blade_motion import PLANE, Side
 from vision.blade_view import view
 from vision.camera import Camera
 from vision.capture import CameraPose
@@ -48,6 +49,7 @@ class BladeTracker:
         self.camera = camera
         self.settings = settings or TrackerSettings()
         self._gate = BladeGate(camera, frame, self.settings)
+        self._rivals = EdgeRivals(self._gate, self.settings)
         self.forget()
 
     def forget(self) -> None:
@@ -62,7 +64,7 @@ class BladeTracker:
         self._taken_s: deque[float] = deque(maxlen=32)
         self._seen_s: dict[str, float] = {}
         self._challenger_seen_s: dict[str, float] = {}
-        self._refused: dict[Side, list[float]] = {side: [] for side in SIDES}
+        self._rivals.forget()
 
     def kept(self) -> Kept | None:
         """What is known now, for another tracker to go on from; None before the blade is confirmed."""
@@ -76,7 +78,7 @@ class BladeTracker:
     def forget_side(self, side: Side) -> None:
         """Drop one edge: it is as unknown as before it was first seen."""
         self._seen_s.pop(side, None)
-        self._refused[side] = []
+        self._rivals.forget(side)
         if self._model is not None:
             self._model = self._model.without(side, self.settings)
 
@@ -100,8 +102,9 @@ class BladeTracker:
         model = self.predict(stamp_s, pose)
         if model is None:
             return None
-        ages = {part: max(stamp_s - seen_s, 0.0) for part, seen_s in self._seen_s.items()}
-        return view(model, self.frame, pose, self.camera, stamp_s, ages, self.settings.surface_sigma_m)
+        seen_s = {p: s for p, s in self._seen_s.items() if p not in impossible(model, self._seen_s, self.settings)}
+        ages = {part: max(stamp_s - seen, 0.0) for part, seen in seen_s.items()}
+        return view(model, self.frame, pose, self.camera, stamp_s, ages, self.settings)
 
     def update(self, observation: BladeObservation, pose: CameraPose) -> UpdateResult:
         """Use an observation taken from `pose` at its own stamp (6.3 to 6.7), also when a later one came first.
@@ -131,11 +134,11 @@ class BladeTracker:
             self._model = model
             return self._challenge(observation, pose, judged.result.reasons)
         self._tremble = self._tremble.learnt(judged.before, judged.used, seconds, self.settings)
-        self._model = self._edges_settled(judged.after, judged.result)
+        self._model = judged.after
         self._challenger, self._challenges = None, 0
         for part in judged.result.parts:
             self._seen_s[part] = max(stamp_s, self._seen_s.get(part, -np.inf))
-        return judged.result
+        return self._edges_settled(judged, observation, pose, seconds)
 
     def _until(self, model: BladeModel, stamp_s: float) -> BladeModel:
         seconds = stamp_s - self._stamp_s
@@ -198,24 +201,20 @@ class BladeTracker:
         sigmas = np.array([settings.inflation_m, *[settings.inflation_slope] * (count - 1)])
         return model.inflated(values, sigmas)
 
-    def _edges_settled(self, model: BladeModel, result: UpdateResult) -> BladeModel:
-        """Count refused edges: a row of them makes the edge less certain, a long agreeing row makes it forgotten."""
-        settings = self.settings
-        for side in SIDES:
-            if side in result.parts:
-                self._refused[side] = []
-            if side not in result.refused_m:
-                continue
-            refused = self._refused[side]
-            refused.append(result.refused_m[side])
-            recent = refused[-settings.restart_after :]
-            if len(recent) == settings.restart_after and np.ptp(recent) < settings.inflation_limit_m:
-                self._refused[side] = []
-                self._seen_s.pop(side, None)
-                model = model.without(side, settings)
-            elif len(refused) > settings.patience:
-                model = self._less_certain(model, EDGE[side])
-        return model
+    def _edges_settled(
+        self, judged: Judged, observation: BladeObservation, pose: CameraPose, seconds: float
+    ) -> UpdateResult:
+        """Begin an edge anew that refused observations agree to see elsewhere, and forget one that no blade has."""
+        reasons = list(judged.result.reasons)
+        for side, model in self._rivals.after(judged, observation, pose, self._tremble, seconds).items():
+            self._model = model
+            self._seen_s[side] = max(observation.stamp_s, self._seen_s.get(side, -np.inf))
+            reasons.append(f"started the {side} edge again from {self.settings.restart_after} agreeing observations")
+        assert self._model is not None
+        for side in impossible(self._model, self._seen_s, self.settings):
+            self.forget_side(side)
+            reasons.append(f"the {side} edge is forgotten: no blade has it there")
+        return replace(judged.result, reasons=tuple(reasons))
 
 
 def _finite(observation: BladeObservation, pose: CameraPose) -> bool:

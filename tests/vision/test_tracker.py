@@ -134,7 +134,7 @@ def observed(
     exact = truth = blade.state(hit[0], hit[1])
     if noisy:
         left_out = [SETTINGS.surface_sigma_m, *[SETTINGS.surface_slope_sigma] * 2]
-        left_out += [SETTINGS.edge_sigma_m, SETTINGS.edge_slope_sigma] * 2
+        left_out += [SETTINGS.edge_sigma_m[1], SETTINGS.edge_slope_sigma[1]] * 2
         truth = truth + rng.normal(0, left_out)
 
     def surface(s: float, n: float, plane: np.ndarray) -> np.ndarray:
@@ -197,7 +197,7 @@ def fly(
     waiting: list[tuple[float, BladeObservation, CameraPose]] = []
     for k in range(int(seconds / PERIOD)):
         now = k * PERIOD
-        station, offset = 10.0 + speed * now, -0.4 + 0.2 * np.sin(now)
+        station, offset = 15.0 + speed * now, -0.4 + 0.2 * np.sin(now)
         true = flight.true_pose(station, offset)
         flight.drifts(PERIOD)
         pose = flight.reported(true)
@@ -240,7 +240,7 @@ def test_a_camera_that_is_turned_against_its_reports_is_found_out() -> None:
     tracker = BladeTracker(frame, CAMERA)
     updates, errors = [], []
     for k in range(250):
-        true = flight.true_pose(10.0 + 0.08 * k, -0.4)
+        true = flight.true_pose(15.0 + 0.08 * k, -0.4)
         flight.drifts(PERIOD)
         pose = flight.reported(true)
         updates.append(tracker.update(flight.observation(k * PERIOD, true), pose))
@@ -263,7 +263,7 @@ def test_the_trembling_of_the_reported_position_is_learnt(jitter_m: float) -> No
     tracker = BladeTracker(frame, CAMERA, SETTINGS)
     updates = []
     for k in range(300):
-        true = flight.true_pose(10.0 + 0.08 * k, -0.4)
+        true = flight.true_pose(15.0 + 0.08 * k, -0.4)
         flight.drifts(PERIOD)
         updates.append(tracker.update(flight.observation(k * PERIOD, true), flight.reported(true)))
     late = [update for update in updates[150:] if update.accepted]
@@ -293,7 +293,7 @@ def test_fifteen_seconds_without_vision_are_caught_up_with_at_once() -> None:
     tracker = BladeTracker(frame, CAMERA, SETTINGS)
     accepted = []
     for k in range(400):
-        true = flight.true_pose(10.0 + 0.04 * k, -0.4)
+        true = flight.true_pose(15.0 + 0.04 * k, -0.4)
         flight.drifts(PERIOD)
         pose = flight.reported(true)
         if 15.0 <= k * PERIOD < 30.0:
@@ -342,10 +342,10 @@ def test_three_seconds_without_vision_are_bridged(azimuth: float) -> None:
 
 
 def settled(azimuth: float = 0.7, sides: tuple[str, ...] = ("leading", "trailing")):
-    """A tracker that has watched a straight blade for two seconds, hovering at 10 m of station."""
+    """A tracker that has watched a straight blade for two seconds, hovering at 15 m of station."""
     flight = Flight(Blade(blade_frame(azimuth), 3, wander=0.0), np.random.default_rng(2), np.zeros(3))
     tracker = BladeTracker(flight.blade.frame, CAMERA, SETTINGS)
-    true = flight.true_pose(10.0, -0.4)
+    true = flight.true_pose(15.0, -0.4)
     for k in range(20):
         pose = flight.reported(true)
         tracker.update(flight.observation(k * PERIOD, true, sides), pose)
@@ -548,9 +548,9 @@ def test_turning_the_blade_turns_the_picture_and_nothing_else(turn: float, azimu
 def test_nearest_point_is_that_of_the_strip_between_the_edges() -> None:
     flight, tracker, _ = settled(azimuth=0.0)
     for offset in (-0.4, 2.5, -4.0):
-        pose = flight.true_pose(10.0, offset)
+        pose = flight.true_pose(15.0, offset)
         estimate = tracker.estimate(2.0, pose)
-        stations, shares = np.meshgrid(np.linspace(5, 15, 401), np.linspace(0, 1, 201))
+        stations, shares = np.meshgrid(np.linspace(10, 20, 401), np.linspace(0, 1, 201))
         states = [flight.blade.state(s, 0.0) for s in stations[0]]
         trailing, leading = np.array([s[5] for s in states]), np.array([s[3] for s in states])
         n = trailing + (leading - trailing) * shares
