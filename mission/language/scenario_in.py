@@ -164,7 +164,7 @@ class _Reader:
             if key in fields and (not isinstance(value, types) or (isinstance(value, bool) and bool not in types)):
                 self.report(places[key], f"{key}: {STEP[key]}; not {value!r}")
                 fields.pop(key)
-            elif types == (int, float) and key in fields and not 0 <= value <= LONGEST_S:
+            elif isinstance(value, int | float) and types == (int, float) and not 0 <= value <= LONGEST_S:
                 self.report(places[key], f"{key}: {STEP[key]}; not {value:g}", f"0 to {LONGEST_S:g}")
                 fields.pop(key)
         for name, value in fields.get("given", {}).items():
