@@ -19,7 +19,7 @@ ACROSS = (5.0, 8.0, 12.0, 16.0)  # px beyond a step where its outside is looked 
 ALONG = 40  # places along it
 SPACING = (16.0, 44.0)  # px between neighbouring dots, midway between which the blade itself is seen
 ORDINARY = 0.05  # share of the blade that is brighter, and darker, than what it ordinarily shows
-LEAST_UNLIKE = 0.5  # of the step: so far out of the blade's ordinary range its outside lies
+MOST_EMPTY = 0.15  # of the dots up to a step that may be missing, or the blade ends before it
 LEAST_TINT, SPREADS = 0.01, 3.0  # of another colour: log of the ratio of tones, and in spreads of the blade's own
 DARK = 4.0  # grey levels added before ratios are taken
 FEWEST = 5  # places that tell what the blade looks like
@@ -35,17 +35,17 @@ def witnessed(edge: Candidate, dots: Array, reach: float = BEYOND_PX) -> bool:
 
 
 def parts_unlike(edge: Candidate, blade: Blade, smooth: Image) -> bool:
-    """Whether what is beyond a step has another colour than the blade between its dots (n, 2), or is brighter or
-    darker than the blade ordinarily is."""
+    """Whether what is beyond a step has another colour than the blade between its dots, or is brighter or darker than
+    the blade ordinarily is by more than the step, and no dots are missing before it."""
     centre = (np.array(smooth.shape[1::-1]) - 1) / 2
     own = _tones(smooth, _between(blade.dots) + centre)
     place = np.linspace(*edge.ends, ALONG)[:, None] * edge.profile.direction[edge.index]
     outside = _tones(smooth, np.vstack([place + edge.outward * (edge.rho + off) for off in ACROSS]) + centre)
-    if len(own) < FEWEST or len(outside) < FEWEST:
+    if len(own) < FEWEST or len(outside) < FEWEST or edge.empty > MOST_EMPTY:
         return False
     low, high = np.quantile(own, [ORDINARY, 1 - ORDINARY], axis=0)
     typical = np.median(outside, axis=0)
-    if float(np.maximum(low - typical, typical - high).max()) > LEAST_UNLIKE * edge.step:
+    if float(np.maximum(low - typical, typical - high).max()) > edge.step:
         return True
     tint, theirs = _tint(own), _tint(outside)
     apart = np.abs(np.median(theirs, axis=0) - np.median(tint, axis=0))
