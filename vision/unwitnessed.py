@@ -19,6 +19,7 @@ ACROSS = (5.0, 8.0, 12.0, 16.0)  # px beyond a step where its outside is looked 
 ALONG = 40  # places along it
 SPACING = (16.0, 44.0)  # px between neighbouring dots, midway between which the blade itself is seen
 ORDINARY = 0.05  # share of the blade that is brighter, and darker, than what it ordinarily shows
+LEAST_UNLIKE, TEXTURES = 0.5, 4.0  # of the step, and of the blade's own: so far out of its range the outside lies
 MOST_EMPTY = 0.15  # of the dots up to a step that may be missing, or the blade ends before it
 LEAST_TINT, SPREADS = 0.01, 3.0  # of another colour: log of the ratio of tones, and in spreads of the blade's own
 DARK = 4.0  # grey levels added before ratios are taken
@@ -36,7 +37,7 @@ def witnessed(edge: Candidate, dots: Array, reach: float = BEYOND_PX) -> bool:
 
 def parts_unlike(edge: Candidate, blade: Blade, smooth: Image) -> bool:
     """Whether what is beyond a step has another colour than the blade between its dots, or is brighter or darker than
-    the blade ordinarily is by more than the step, and no dots are missing before it."""
+    the blade ordinarily is by far, and no dots are missing before it."""
     centre = (np.array(smooth.shape[1::-1]) - 1) / 2
     own = _tones(smooth, _between(blade.dots) + centre)
     place = np.linspace(*edge.ends, ALONG)[:, None] * edge.profile.direction[edge.index]
@@ -45,7 +46,8 @@ def parts_unlike(edge: Candidate, blade: Blade, smooth: Image) -> bool:
         return False
     low, high = np.quantile(own, [ORDINARY, 1 - ORDINARY], axis=0)
     typical = np.median(outside, axis=0)
-    if float(np.maximum(low - typical, typical - high).max()) > edge.step:
+    unlike = float(np.maximum(low - typical, typical - high).max())
+    if unlike > max(LEAST_UNLIKE * edge.step, TEXTURES * blade.texture):
         return True
     tint, theirs = _tint(own), _tint(outside)
     apart = np.abs(np.median(theirs, axis=0) - np.median(tint, axis=0))
