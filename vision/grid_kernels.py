@@ -110,21 +110,21 @@ def components(
 
 @compiled
 def surfaces(
-    index: Indices, weight: Array, misfit: Array, label: Indices, labels: int, cells: int, columns: int, least: int,
-    least_misfit: float, surface: Indices,
+    index: Indices, weight: Array, misfit: Array, order: Indices, label: Indices, labels: int, cells: int, columns: int,
+    least: int, least_misfit: float, surface: Indices,
 ) -> float:  # fmt: skip
     """Share out candidates among surfaces, the best supported group first: no spot and no ray twice.
 
-    index (n, 4) as of `pairs`, right -1 without one; weight, misfit, label (n,); least: dots of a surface;
-    least_misfit: no reading is known to fit better. Written: surface (n,), -1 for what is
-    dropped. Returned: support of the best reading that contradicts the first surface, over the first's."""
+    index (n, 4) as of `pairs`, right -1 without one; weight, misfit, label (n,); order (n,): by rising misfit; least:
+    dots of a surface; least_misfit: no reading is known to fit better. Written: surface (n,), -1 for what is dropped.
+    Returned: support of the best reading that contradicts the first surface, over the first's."""
     count = len(index)
     lefts, rights = 1, 1
     for k in range(count):
         lefts, rights = max(lefts, index[k, 0] + 1), max(rights, index[k, 1] + 1)
     alive = np.ones(count, np.bool_)
     surface[:] = -1
-    scores = np.empty(labels)
+    scores, member_misfit = np.empty(labels), np.empty(count)
     best_left, best_right = np.empty(lefts, np.int64), np.empty(rights, np.int64)
     best_cell, used = np.empty(cells, np.int64), np.zeros(cells, np.bool_)
     rival, number = 0.0, 0
@@ -139,12 +139,15 @@ def surfaces(
                 best = k
         if labels == 0 or scores[best] <= 0:
             return rival
-        members = np.flatnonzero(alive & (label == best))
         # of several that share a spot or a ray, the one that fits the grid best stays
         best_left[:], best_right[:], best_cell[:] = -1, -1, -1
-        order = np.argsort(misfit[members], kind="mergesort")
-        for at in range(len(order)):
-            one = members[order[at]]
+        members = 0
+        for one in order:
+            if not alive[one] or label[one] != best:
+                continue
+            alive[one] = False
+            member_misfit[members] = misfit[one]
+            members += 1
             cell, spot, right = index[one, 2] * columns + index[one, 3], index[one, 0], index[one, 1]
             if best_left[spot] < 0 and (right < 0 or best_right[right] < 0) and best_cell[cell] < 0:
                 best_left[spot] = one
@@ -152,7 +155,6 @@ def surfaces(
                 if right >= 0:
                     best_right[right] = one
         size = 0
-        alive[members] = False
         for k in range(count):
             if best_left[index[k, 0]] == k:
                 size += 1
@@ -160,7 +162,8 @@ def surfaces(
             return rival
         scores[:] = 0
         # how well the best reading fits the grid is what another reading has to equal
-        usual = max(np.median(misfit[members]) / 1.18, least_misfit)
+        usual = 0.5 * (member_misfit[(members - 1) // 2] + member_misfit[members // 2])
+        usual = max(usual / 1.18, least_misfit)
         first = 0.0
         for k in range(count):
             if best_left[index[k, 0]] == k:

@@ -101,7 +101,8 @@ def robust(design: Array, values: Array, sigma: Array, held: Array, solution: Ar
         for i in range(unknowns):
             normal[i, i] += held[i]
         solve(normal, right)
-        solution[:] = right
+        for i in range(unknowns):  # a copied slice would take seconds to compile
+            solution[i] = right[i]
     cost = 0.0
     for n in range(count):
         residual = values[n]
