@@ -6,6 +6,7 @@ an autopilot that is asked to land again and again does so, which every report r
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -28,7 +29,7 @@ class EventProof:
 
 @dataclass(frozen=True)
 class Proof:
-    """Everything that was explored and found."""
+    """Everything that was explored and found. failures: ways that never end although nothing unsafe happens."""
 
     mission: Mission
     situations: int
@@ -36,11 +37,13 @@ class Proof:
     events: tuple[EventProof, ...]
     invariants: tuple[InvariantProof, ...]
     assumptions: tuple[str, ...] = ()
+    failures: tuple[Failure, ...] = ()
 
     @property
     def holds(self) -> bool:
         """Whether every property holds."""
-        return not any(one.failures for one in self.events) and all(one.failure is None for one in self.invariants)
+        events = not any(one.failures for one in self.events)
+        return events and not self.failures and all(one.failure is None for one in self.invariants)
 
 
 def prove(mission: Mission) -> Proof:
@@ -56,7 +59,19 @@ def prove(mission: Mission) -> Proof:
         tuple(_event(event, airborne, exploration, graph, blind) for event in safety_events()),
         tuple(invariant_proof(invariant, exploration, graph) for invariant in mission.invariants),
         tuple(sorted(graph.assumptions)),
+        _endless(exploration, graph),
     )
+
+
+def _endless(exploration: Exploration, graph: Endings) -> tuple[Failure, ...]:
+    """What keeps the mission's own work from ending: a deadlock, a livelock, an end in the air; the nearest of each."""
+    found: dict[str, Failure] = {}
+    for situation in exploration.situations:
+        trouble = graph.troubles.get(situation)
+        if trouble is not None and trouble.kind not in found:
+            trace = (*exploration.trace(situation), *_to_trouble(graph, situation, trouble))
+            found[trouble.kind] = Failure(trouble.kind, trouble.message, trace)
+    return tuple(found.values())
 
 
 def _event(
@@ -102,10 +117,11 @@ def _must_answer(event: Event, situation: Situation, exploration: Exploration) -
 def _to_trouble(graph: Endings, start: Situation, trouble: Failure) -> tuple[Edge, ...]:
     """The shortest automatic way to a situation that has this trouble of its own."""
     came: dict[Situation, Edge | None] = {start: None}
+    named = set(re.findall(r"[\w.]+", trouble.message))
     waiting = [start]
     for situation in waiting:
         onward = [edge for edge in graph.edges[situation] if graph.troubles.get(edge.target) == trouble]
-        if not onward or situation.leaf in trouble.message:
+        if not onward or situation.leaf in named:
             return _back(came, situation)
         for edge in onward:
             if edge.target not in came:

@@ -22,6 +22,10 @@ def _lines(proof: Proof, traces: bool) -> Iterator[str]:
         f"{len(proof.events)} safety events in every airborne situation, guards free"
     )
     width = max((len(one.event.name) for one in proof.events), default=0)
+    yield f"  {'holds' if not proof.failures else 'FAILS'}  every way ends"
+    for failure in proof.failures:
+        yield f"         M401 {failure.kind}: {failure.message}"
+        yield from _trace(failure.trace)
     for one in proof.events:
         yield f"  {'holds' if not one.failures else 'FAILS'}  {one.event.name.ljust(width)}  {_measure(one)}"
         for failure in one.failures:
@@ -69,6 +73,7 @@ def data(proof: Proof) -> dict[str, Any]:
         "situations": proof.situations,
         "steps": proof.steps,
         "assumptions": list(proof.assumptions),
+        "failures": [_failure(failure) for failure in proof.failures],
         "events": [
             {
                 "event": one.event.name,

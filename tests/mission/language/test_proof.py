@@ -71,6 +71,14 @@ def test_a_way_out_that_goes_round_is_a_livelock(tmp_path: Path) -> None:
     assert about(bounded, "abort").longest.steps >= 2 * 5
 
 
+def test_work_that_goes_round_for_ever_is_a_livelock_though_every_abort_ends(tmp_path: Path) -> None:
+    proof = proof_of(tmp_path, SMALL.replace("done: home", "done: work"))
+    assert not proof.holds and not any(one.failures for one in proof.events)
+    (failure,) = proof.failures
+    assert failure.kind == "livelock" and "work → work" in failure.message
+    assert [edge.target.leaf for edge in failure.trace][-1] == "work"
+
+
 def test_a_way_out_that_needs_images_is_found(tmp_path: Path) -> None:
     text = SMALL.replace("on: {done: home, abort: land}", "on: {done: home, abort: look}")
     text += "  look: {do: align_gimbal, timeout_s: 9, on: {aligned: land, failed: land}}\n"
