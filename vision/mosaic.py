@@ -55,6 +55,9 @@ def _quartered(image: Image, red_row: int, red_column: int, reduced: Image) -> N
     low, fold = np.uint64(0xFFFF), np.uint64(32)
     two, three, four = np.uint64(2), np.uint64(3), np.uint64(4)
     at_red, beside = np.uint64(16 * red_column), np.uint64(16 - 16 * red_column)
+    flat = reduced.reshape(-1)
+    lines = np.empty((3, width), np.uint8)  # colours apart first: only so are they reckoned side by side
+    line_blue, line_green, line_red = lines[0], lines[1], lines[2]
     for v in range(height):
         r0, r1, r2, r3 = image[4 * v], image[4 * v + 1], image[4 * v + 2], image[4 * v + 3]
         for i in range(4 * width):
@@ -62,9 +65,13 @@ def _quartered(image: Image, red_row: int, red_column: int, reduced: Image) -> N
         for i in range(4 * width):
             odd[i] = np.uint16(r1[i]) + np.uint16(r3[i])
         reds, blues = (odd_words, even_words) if red_row else (even_words, odd_words)
-        out = reduced[v]
         for u in range(width):
             red, blue = reds[u] + (reds[u] >> fold), blues[u] + (blues[u] >> fold)
-            out[u, 0] = np.uint8((((blue >> beside) & low) + two) >> two)
-            out[u, 1] = np.uint8((((red >> beside) & low) + ((blue >> at_red) & low) + four) >> three)
-            out[u, 2] = np.uint8((((red >> at_red) & low) + two) >> two)
+            line_blue[u] = np.uint8((((blue >> beside) & low) + two) >> two)
+            line_green[u] = np.uint8((((red >> beside) & low) + ((blue >> at_red) & low) + four) >> three)
+            line_red[u] = np.uint8((((red >> at_red) & low) + two) >> two)
+        out = flat[3 * width * v : 3 * width * (v + 1)]
+        for u in range(width):
+            out[3 * u] = line_blue[u]
+            out[3 * u + 1] = line_green[u]
+            out[3 * u + 2] = line_red[u]
