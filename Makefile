@@ -3,6 +3,8 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 MISSION ?= missions/v80_blade.yaml
+# compiles inner loops, so that neither the first flight nor the first test waits for that
+READY  := $(BIN)/python -m mission.executive.ready missions/v80_blade.yaml
 
 .PHONY: help run test check schema bench campaign clean
 
@@ -12,11 +14,13 @@ help:            ## this list
 $(VENV)/.run: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[sim]'
+	@$(READY)
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@$(READY)
 	@touch $@ $(VENV)/.run
 
 run: $(VENV)/.run   ## fly the default mission in the embedded simulator

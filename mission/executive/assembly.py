@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from mission.executive.belief import located, surveyed_turbine
 from mission.executive.knowledge import Keeping, Knowledge, go_on_from, read_knowledge
+from mission.executive.ready import make_ready
 from mission.executive.resume import Interrupted, last_of, restore, where
 from mission.executive.signals import interrupting
 from mission.executive.simulation import Rehearsal
@@ -74,20 +75,17 @@ def fly(options: FlightOptions) -> FlightResult:
     """
     from mission.record.folder import RunFolder
     from mission.record.run_log import RunLog
-    from vision.pipeline import Eye
-    from vision.warm_up import warm_up
 
     past = None if options.resume is None else last_of(RunFolder(options.resume), options.mission)
     knowledge = None if past is None or past.folder is None else read_knowledge(past.folder)
     start_s = max(0.0 if past is None else past.t, 0.0 if knowledge is None else knowledge.t)
     log = RunLog(options.folder.log)
     try:
-        with lockstep_stage(options, start_s) if options.lockstep else wall_stage(options, start_s) as stage:
-            if stage.world is not None:
-                _ = stage.world.renderer  # drawn for the first time before anything flies
-            warm_up(Eye(stage.rig.geometry))  # and compiled: that takes seconds once on a machine
-            with asyncio.Runner(loop_factory=stage.loop_factory) as runner:
-                return runner.run(_fly(options, stage, past, knowledge, log.logger))
+        with (
+            lockstep_stage(options, start_s) if options.lockstep else wall_stage(options, start_s) as stage,
+            asyncio.Runner(loop_factory=stage.loop_factory) as runner,
+        ):
+            return runner.run(_fly(options, stage, past, knowledge, log.logger))
     finally:
         log.close()
 
@@ -114,6 +112,10 @@ async def _fly(
                 return FlightResult("refused", options.mission.initial, False)
             for name, value in stage.parameters.items():
                 await stage.autopilot.set_parameter(name, value)
+            if options.lockstep:
+                make_ready(stage.world, stage.rig.geometry)
+            else:
+                await asyncio.to_thread(make_ready, stage.world, stage.rig.geometry)
         except AutopilotError as error:
             raise FlightError(str(error)) from error
         journal = Journal(options.folder.journal, threaded=not options.lockstep)

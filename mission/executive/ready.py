@@ -1,0 +1,38 @@
+"""Draws and looks once before anything flies, so that inner loops are compiled by then: seconds, once on a machine.
+
+`python -m mission.executive.ready MISSION` does so at set-up.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from devices.world.world import World
+    from vision.camera import RigGeometry
+
+
+def make_ready(world: World | None, geometry: RigGeometry) -> None:
+    """Compile what the simulated world, if there is one, and the eye of this rig run. Blocks."""
+    from vision.pipeline import Eye
+    from vision.warm_up import warm_up
+
+    if world is not None:
+        _ = world.renderer
+    warm_up(Eye(geometry))
+
+
+def main() -> None:
+    """Make ready for the mission that the command line names."""
+    from mission.executive.belief import rig_geometry
+    from mission.executive.simulation import build_world
+    from mission.language.document import load
+
+    mission = load(Path(sys.argv[1]))
+    make_ready(build_world(mission), rig_geometry(mission.rig, mission.path.parent))
+
+
+if __name__ == "__main__":
+    main()
