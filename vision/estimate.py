@@ -67,8 +67,8 @@ class BladeEstimate:
     surface, local NED.
     depth_m, depth_slope, across_slope: the surface in blade coordinates, depth = depth_m + depth_slope (s - station_m)
     + across_slope (n - offset of `point`). leading, trailing: the edges, None before first seen.
-    heading: direction from root to tip in the image now, radians. state (7,), covariance (7, 7): plane and edges, for the
-    record.
+    heading: direction from root to tip in the image now, radians. state (7,), covariance (7, 7): plane and edges,
+    for the record.
     """
 
     stamp_s: float
