@@ -88,9 +88,9 @@ class Chronicle:
             self._station_m = round(station, 1)
             self._line("progress", state=state, station_m=self._station_m)
 
-    def acts(self, command: str, who: str, **about: Any) -> None:
-        """What an operator did."""
-        self._line("operator", command=command, who=who, **about)
+    def acts(self, command: str, who: str, *, soon: bool = False, **about: Any) -> None:
+        """What an operator did. `soon`: a line about what it leads to follows at once."""
+        self._line("operator", soon=soon, command=command, who=who, **about)
 
     def fails(self, error: Exception) -> None:
         """An error of the executive itself."""

@@ -102,7 +102,8 @@ class Conductor:
         if entry.lets_go:
             self._helm.let_go()
         if entry.raised_by == "operator" and "by" in data:
-            self.note(name, str(data["by"]), **{key: value for key, value in data.items() if key != "by"})
+            about = {key: value for key, value in data.items() if key != "by"}
+            self._chronicle.acts(name, str(data["by"]), soon=True, **about)  # with the event, one write
         self._queue.put(name, data)
 
     def confirm(self, yes: bool) -> str:
@@ -200,7 +201,7 @@ class Conductor:
         self._chronicle.steps(step)
         if self._chronicle.journal.pending:
             await self._helm.patiently(self._chronicle.journal.durable(), SLOWEST_DISK_S)
-        await self._machine.take(queued.name, quantities, queued.origin, transition)
+        await self._machine.take(queued.name, quantities, queued.origin, transition, step)
         now = self._clock.now()
         self._timing = self._timing.stepping(self.mission, step, now)
         self._questions.take()

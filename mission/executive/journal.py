@@ -15,7 +15,8 @@ from typing import Any
 from devices.torn_files import LARGEST
 
 FORMAT = 1  # of the journal, as its first line says
-_encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False).encode
+_encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False, check_circular=False).encode  # what `_plain` returns
+_AS_IT_IS = frozenset((str, int, bool, type(None)))
 _NAMES = {"event": ("event",), "transition": ("key", "to")}
 SLOWEST_DISK_S = 1.0  # a disk that takes longer must not hold up the flight
 
@@ -203,14 +204,14 @@ def _parsed(line: bytes) -> Entry | None:
 
 def _plain(value: Any) -> Any:
     """Values as JSON knows them: no NaN, no numpy, floats to a micro-unit so that a line stays short."""
-    if isinstance(value, bool | int | str) or value is None:
+    if type(value) in _AS_IT_IS:
         return value
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
     if isinstance(value, float):
-        return round(value, 6) if math.isfinite(value) else None
+        return round(float(value), 6) if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {str(name): _plain(item) for name, item in value.items()}
     if isinstance(value, list | tuple | set | frozenset):
         return [_plain(item) for item in value]
-    return str(value)
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    return value if isinstance(value, int | str) else str(value)

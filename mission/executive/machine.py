@@ -7,12 +7,17 @@ of events that one event falls back to are compiled into guarded transitions, so
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from transitions.extensions.asyncio import HierarchicalAsyncMachine, NestedAsyncState, NestedAsyncTransition
+from transitions.extensions.asyncio import (
+    AsyncEventData,
+    HierarchicalAsyncMachine,
+    NestedAsyncState,
+    NestedAsyncTransition,
+)
 
 from mission.executive.events import fallbacks
 from mission.language import semantics
@@ -31,46 +36,38 @@ class _State(NestedAsyncState):
 
 
 class _Transition(NestedAsyncTransition):
-    """What costs time and gives nothing here is left out: tasks for guards, and callbacks on final states."""
+    """Carried out without what costs time and gives nothing here: tasks for guards, and callbacks, of which no state
+    has any."""
 
-    async def _eval_conditions(self, event_data: Any) -> bool:  # type: ignore[override, unused-ignore]
-        conditions: list[Any] = self.conditions
-        return all([await condition.check(event_data) for condition in conditions])
-
-    def _final_check(self, event_data: Any, state_tree: Any, enter_partials: Any) -> tuple[list[Any], bool]:
-        return [], False
+    async def execute(self, event_data: Any) -> bool:  # type: ignore[override, unused-ignore]
+        guards: list[Any] = self.conditions
+        actions: list[Any] = self.before
+        if not all(guard.func(event_data) for guard in guards):
+            return False
+        for action in actions:
+            action(event_data)
+        event_data.machine.set_state(self.dest, event_data.model)
+        return True
 
 
 class _Library(HierarchicalAsyncMachine):
+    """One active leaf, one task that moves it, and every transition under its state's whole path: an event need not be
+    sought scope by scope, nor as a task that others may cancel."""
+
     state_cls = _State
     transition_cls = _Transition
 
-    def __init__(self, **settings: Any) -> None:
-        self._known: dict[str, Any] = {}
-        super().__init__(**settings)
-
-    def get_state(self, state: Any, hint: Any = None) -> Any:
-        """As the library finds it, but once for each path."""
-        path = ".".join((*self.prefix_path, state if isinstance(state, str) else ".".join(state)))
-        found = self._known.get(path)
-        if found is None:
-            found = super().get_state(state, hint)
-            if hint is None:
-                self._known[path] = found
-        return found
-
-    async def process_context(self, func: Callable[[], Awaitable[Any]], model: Any) -> bool:
-        """One task alone moves this machine, and its cancellation is nothing to swallow."""
-        result: bool = await func()
-        return result
-
-    async def cancel_running_transitions(self, model: Any, msg: Any = None) -> None:
-        """There are none: see `process_context`."""
-
-    async def callbacks(self, funcs: Iterable[Any], event_data: Any) -> None:  # type: ignore[override, unused-ignore]
-        """One after the other, and nothing at all where there are none."""
-        for func in funcs:
-            await self.callback(func, event_data)
+    async def trigger_event(  # type: ignore[override, unused-ignore]
+        self, model: Any, trigger: str, *about: Any, **more: Any
+    ) -> bool:
+        """Try the transitions of the event, the innermost active state's first; whether one was carried out."""
+        event: Any = self.events[trigger]
+        about_it = AsyncEventData(None, event, self, model, about, more)
+        for source in enclosing(model.state):
+            for transition in event.transitions.get(source, ()):
+                if await transition.execute(about_it):
+                    return True
+        return False
 
 
 @dataclass
@@ -125,11 +122,17 @@ class Machine:
         return semantics.choose(self.mission, self.configuration, event, quantities, origin)
 
     async def take(
-        self, event: str, quantities: Quantities, origin: str | None = None, only: Transition | None = None
+        self,
+        event: str,
+        quantities: Quantities,
+        origin: str | None = None,
+        only: Transition | None = None,
+        says: Step | None = None,
     ) -> Step | None:
         """Let the event happen: the transition that answers it is carried out. None where nothing answers.
 
-        only: the one transition that may be taken, where its delay has passed or the operator has agreed to it.
+        only: the one transition that may be taken, where its delay has passed or the operator has agreed to it. says:
+        what the rules say that this one does, where that is known already.
 
         Raises:
             MachineError: the library ended elsewhere than the rules say.
@@ -137,13 +140,13 @@ class Machine:
         before = self.configuration
         attempt = self._attempt = _Attempt(quantities, origin, only)
         for name in fallbacks(event) if only is None else (only.event,):
-            if name in self._library.events and await self._position.trigger(name):  # type: ignore[attr-defined]
+            if name in self._library.events and await self._library.trigger_event(self._position, name):
                 break
         if attempt.taken is None:
             if only is not None:
                 raise MachineError(f"{event} in {before.leaf}: {only.key} was chosen, but the machine did not take it")
             return None
-        step = semantics.take(self.mission, before, attempt.taken, event)
+        step = says or semantics.take(self.mission, before, attempt.taken, event)
         if self.state != step.after.leaf:
             raise MachineError(
                 f"{event} in {before.leaf}: the machine went to {self.state}, the rules say {step.after.leaf}"

@@ -15,7 +15,8 @@ tested is what flies.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from mission.language.document import Mission, Transition, enclosing
 
@@ -31,7 +32,7 @@ class Configuration:
     history: Mapping[str, str] = field(default_factory=dict)
     taken: Mapping[str, int] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def active(self) -> tuple[str, ...]:
         """The leaf and all states around it, innermost first."""
         return tuple(enclosing(self.leaf))
@@ -128,7 +129,7 @@ def take(mission: Mission, configuration: Configuration, transition: Transition,
     taken = dict(configuration.taken)
     if transition.retries is not None:
         taken[transition.key] = taken.get(transition.key, 0) + 1
-    after = replace(configuration, leaf=leaf, history=history, taken=taken)
+    after = Configuration(leaf, history, taken)
     return Step(event or transition.event, transition, configuration.leaf, exited, entered, after)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from transitions.extensions.asyncio import HierarchicalAsyncMachine, NestedAsyncState
 
 from mission.executive.machine import Machine, MachineError, entries
 from mission.language import semantics
@@ -96,6 +97,27 @@ def test_library_and_rules_agree_on_any_sequence_of_events(mission: Mission, hap
                 configuration = step.after
             assert machine.configuration == configuration
             assert machine.state == configuration.leaf
+
+    asyncio.run(walk())
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(missions(), happenings)
+def test_what_is_left_out_of_the_library_changes_nothing(mission: Mission, happening: list[Any]) -> None:
+    class Dotted(NestedAsyncState):
+        separator = "."
+
+    class AsItComes(HierarchicalAsyncMachine):
+        state_cls = Dotted
+
+    async def walk() -> None:
+        lean = Machine(mission)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("mission.executive.machine._Library", AsItComes)
+            whole = Machine(mission)
+        for event, quantities, _ in happening:
+            assert await lean.take(event, quantities) == await whole.take(event, quantities)
+            assert lean.state == whole.state
 
     asyncio.run(walk())
 
