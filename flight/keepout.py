@@ -14,6 +14,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.rotor_slab import BladeSurface, RotorSlab
 from flight.solids import Ball, Box, Point, Revolved, Solid
 from flight.turbine import Turbine
 from vision.estimate import BladeEstimate
@@ -26,22 +27,7 @@ DISTRUST_S = 20.0  # seconds without it until the survey's is back: longer than 
 RETREAT_M_S = 0.5  # how fast a trusted surface may move away from the vehicle
 TRUSTED_SIGMA_M = 0.3  # a distance less certain than this opens nothing
 TRUSTED_AGE_S = 1.0
-LOCAL_M = 5.0  # the measured surface holds this far along the blade and fades out over as much again
 ROOT_SIGMA_M = 0.5  # of the hub beside a measured root: only its place along the blade is still the survey's
-BEND_PER_M = 0.05  # how much a blade may leave its tangent, metres a metre
-TIP_HALF_DEPTH_M = 0.3  # half of what a twisted tip takes up from front to back
-
-
-@dataclass(frozen=True)
-class BladeSurface:
-    """The measured front of the inspected blade in blade coordinates: depth = depth_m + slope (station − station_m)
-    with its sigma, and how far it has replaced the survey: trust 0 to 1."""
-
-    station_m: float
-    depth_m: float
-    slope: float
-    sigma_m: float
-    trust: float
 
 
 @dataclass(frozen=True)
@@ -134,8 +120,9 @@ class KeepOut:
     def _solids(self) -> tuple[Solid, ...]:
         t = self.turbine
         grown = self.clearance_m + self.sigmas * t.hub_sigma_m
-        root = self._root_share()
-        hub = t.hub + root * self._hub_depth() * t.blade_frame().depth
+        rotor = RotorSlab(t, self.sigmas, self.surface)
+        root = rotor.root_share()
+        hub = t.hub + root * rotor.hub_depth() * t.blade_frame().depth
         known = min(t.hub_sigma_m, ROOT_SIGMA_M)
         grown_hub = self.clearance_m + self.sigmas * (root * known + (1.0 - root) * t.hub_sigma_m)
         x, _, z = t.axes()
@@ -145,65 +132,11 @@ class KeepOut:
         tower = ((0.0, 0.0), (0.0, t.tower_top_diameter_m / 2), (height, t.tower_base_diameter_m / 2), (height, 0.0))
         nacelle = np.array([(hub_radius + t.nacelle_length_m) / 2, t.nacelle_width_m / 2, 0.6 * t.nacelle_width_m])
         return (
-            Revolved(t.hub, t.rotor_rotation[:, 0], self._rotor_profile(), self.clearance_m),
+            Revolved(t.hub, t.rotor_rotation[:, 0], rotor.outline(), self.clearance_m),
             Ball(hub, hub_radius + grown_hub),
             Revolved(tower_axis, z, tower, grown),
             Box(hub + (hub_radius + t.nacelle_length_m) / 2 * x, t.rotation, nacelle, grown_hub),
         )
-
-    def _rotor_profile(self) -> tuple[tuple[float, float], ...]:
-        """The slab's outline as (along the rotor's axis, radius), from the faces in blade coordinates."""
-        t, surface = self.turbine, self.surface
-        tip = t.tip_radius_m + self.sigmas * t.hub_sigma_m
-        stations = {0.0, tip}
-        if surface is not None:
-            near = (-2 * LOCAL_M, -LOCAL_M, 0.0, LOCAL_M, 2 * LOCAL_M)
-            stations |= {s for s in (surface.station_m + offset for offset in near) if 0.0 < s < tip}
-        front, back = [], []
-        for station in sorted(stations):
-            thick, unsure = self._half_depth(station), self._survey_sigma(station)
-            face = self._face(station)
-            front.append((face, station))
-            back.append((max(thick + unsure, face + 2 * thick), station))
-        cos, sin = np.cos(t.cone), np.sin(t.cone)
-        outline = [*front, *reversed(back)]
-        return tuple((float(d * cos - s * sin), float(max(s * cos + d * sin, 0.0))) for d, s in outline)
-
-    def _face(self, station: float) -> float:
-        """Depth of the slab's front at a station, in blade coordinates."""
-        survey = -self._half_depth(station) - self._survey_sigma(station)
-        surface = self.surface
-        if surface is None:
-            return survey
-        away = abs(station - surface.station_m)
-        share = surface.trust * float(np.clip(2.0 - away / LOCAL_M, 0.0, 1.0))
-        unsure = self.sigmas * float(np.hypot(surface.sigma_m, BEND_PER_M * away))
-        measured = surface.depth_m + surface.slope * (station - surface.station_m) - unsure
-        if measured < survey and away <= LOCAL_M:
-            return measured
-        return share * measured + (1.0 - share) * survey
-
-    def _root_share(self) -> float:
-        """How far the measured surface speaks for the hub: 1 beside the root and trusted, 0 away from it."""
-        if self.surface is None:
-            return 0.0
-        return self.surface.trust * float(np.clip(2.0 - self.surface.station_m / LOCAL_M, 0.0, 1.0))
-
-    def _hub_depth(self) -> float:
-        """Where the measured blade, extended to the hub, puts the hub's centre along the depth axis of the survey."""
-        surface = self.surface
-        if surface is None:
-            return 0.0
-        return surface.depth_m - surface.slope * surface.station_m + self._half_depth(surface.station_m)
-
-    def _half_depth(self, station: float) -> float:
-        t = self.turbine
-        share = float(np.clip((station - t.root_radius_m) / (t.tip_radius_m - t.root_radius_m), 0.0, 1.0))
-        return (1 - share) * t.root_diameter_m / 2 + share * TIP_HALF_DEPTH_M
-
-    def _survey_sigma(self, station: float) -> float:
-        t = self.turbine
-        return self.sigmas * float(np.hypot(t.hub_sigma_m, t.heading_sigma * station))
 
     def _distance(self, point: Point) -> float:
         return min([solid.distance(point) for solid in self._solids])

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flight.autopilot import AutopilotError, Setpoint, Telemetry, VehiclePose
+from flight.pose_history import PoseHistory
 
 if TYPE_CHECKING:
     from devices.vehicle.truth_log import TruthLog
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 POSE_PERIOD_S = 0.02  # GLOBAL_POSITION_INT and ATTITUDE_QUATERNION, 50 Hz
 _SLOW_PERIODS_S = {"state": 0.2, "range": 0.1, "battery": 0.5, "wind": 0.5}
-_HISTORY = 500
 _COMPONENT = (1, 195)
 
 
@@ -41,7 +40,8 @@ class LockstepAutopilot:
         self._log = truth_log
         self._start_s = start_s
         self._elapsed_s = 0.0
-        self._poses: deque[VehiclePose] = deque(maxlen=_HISTORY)
+        self._poses = PoseHistory()
+        self._pose: VehiclePose | None = None
         self._due = dict.fromkeys(("pose", *_SLOW_PERIODS_S), 0.0)
         self._state = (False, False, "HOLD", False)
         self._battery = self._range_s = math.nan
@@ -63,7 +63,7 @@ class LockstepAutopilot:
     async def connect(self, timeout_s: float) -> None:
         """Listen from now on; the vehicle is found with its first heartbeat."""
         self._connected = True
-        await self._until(lambda: bool(self._poses), timeout_s, "no vehicle was heard")
+        await self._until(lambda: self._pose is not None, timeout_s, "no vehicle was heard")
 
     async def close(self) -> None:
         """Stop listening."""
@@ -77,7 +77,7 @@ class LockstepAutopilot:
         now = self._start_s + self._elapsed_s
         armed, in_air, mode, armable = self._state
         estimate = self.vehicle.settings
-        pose = self._poses[-1] if self._poses else VehiclePose(now, *(np.full(n, np.nan) for n in (3, 3, 3, 2)))
+        pose = self._pose or VehiclePose(now, *(np.full(n, np.nan) for n in (3, 3, 3, 2)))
         age = now - self._heard_s
         down = pose.position[2]
         place = _global_position(estimate.latitude_deg, estimate.longitude_deg, estimate.altitude_m, pose.position)
@@ -99,15 +99,7 @@ class LockstepAutopilot:
 
     def pose_at(self, stamp_s: float) -> VehiclePose | None:
         """The pose interpolated at a time on the executive's clock."""
-        poses = self._poses
-        if not poses or not poses[0].stamp_s <= stamp_s <= poses[-1].stamp_s + 1e-6:
-            return None
-        later = poses[-1]
-        for pose in reversed(poses):
-            if pose.stamp_s <= stamp_s:
-                return _between(pose, later, stamp_s)
-            later = pose
-        return later
+        return self._poses.at(stamp_s)
 
     async def parameters(self, names: Sequence[str]) -> Mapping[str, float]:
         """Values of those parameters that there are."""
@@ -200,15 +192,12 @@ class LockstepAutopilot:
         stamp = self._start_s + now
         self._heard_s = stamp
         estimate = vehicle.estimate
-        self._poses.append(
-            VehiclePose(
-                stamp,
-                np.array([estimate.n, estimate.e, estimate.d]),
-                np.array([estimate.vn, estimate.ve, estimate.vd]),
-                np.array([estimate.roll, estimate.pitch, estimate.yaw]),
-                np.array(vehicle.gimbal.reading),
-            )
-        )
+        position, velocity = (estimate.n, estimate.e, estimate.d), (estimate.vn, estimate.ve, estimate.vd)
+        attitude, gimbal = (estimate.roll, estimate.pitch, estimate.yaw), tuple(vehicle.gimbal.reading)
+        self._poses.position.add(stamp, (*position, *velocity))
+        self._poses.attitude.add(stamp, attitude)
+        self._poses.gimbal.add(stamp, gimbal)
+        self._pose = VehiclePose(stamp, *(np.array(values) for values in (position, velocity, attitude, gimbal)))
         for name, period in _SLOW_PERIODS_S.items():
             if now >= self._due[name] - 1e-9:
                 self._due[name] = now + period
@@ -231,24 +220,6 @@ class LockstepAutopilot:
             self._battery = float(math.ceil(vehicle.battery.percent))
         else:
             self._wind = np.array(vehicle.wind_estimate)
-
-
-def _between(a: VehiclePose, b: VehiclePose, stamp_s: float) -> VehiclePose:
-    if b.stamp_s <= a.stamp_s:
-        return a
-    share = (stamp_s - a.stamp_s) / (b.stamp_s - a.stamp_s)
-    return VehiclePose(
-        stamp_s,
-        a.position + share * (b.position - a.position),
-        a.velocity + share * (b.velocity - a.velocity),
-        a.attitude + share * _turn(b.attitude - a.attitude),
-        a.gimbal + share * _turn(b.gimbal - a.gimbal),
-    )
-
-
-def _turn(angles: np.ndarray) -> np.ndarray:
-    wrapped: np.ndarray = (angles + math.pi) % (2 * math.pi) - math.pi
-    return wrapped
 
 
 def _global_position(latitude: float, longitude: float, altitude: float, position: np.ndarray) -> np.ndarray:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, Literal, Protocol
 
@@ -17,21 +16,11 @@ from flight import px4_modes
 from flight.autopilot import AutopilotError, Setpoint, Telemetry, VehiclePose
 from flight.gimbal import ProcessGimbal, attitude_message
 from flight.mavlink_channel import AUTOPILOT, MavlinkChannel
+from flight.mavsdk_parameters import read_parameters, write_parameter
+from flight.message_streams import keep_streams, request_streams
 from flight.telemetry_intake import HANDLERS, TelemetryIntake
 
-logger = logging.getLogger(__name__)
-
-_INTERVALS_S: Mapping[int, float] = {
-    30: 1 / 30,  # ATTITUDE: 100 Hz would be three poses for each position
-    32: 1 / 30,  # LOCAL_POSITION_NED
-    33: 0.5,  # GLOBAL_POSITION_INT: only shown
-    132: 0.1,  # DISTANCE_SENSOR
-    147: 1.0,  # BATTERY_STATUS
-    230: 0.5,  # ESTIMATOR_STATUS
-    231: 0.5,  # WIND_COV: not sent without being asked for
-    436: 0.1,  # CURRENT_MODE: a mode that a pilot takes shall be seen at once, not with the next heartbeat
-}
-_SET_MESSAGE_INTERVAL, _SET_MODE, _TAKE_GIMBAL = 511, 176, 1001
+_SET_MODE, _TAKE_GIMBAL = 176, 1001
 _CUSTOM_MODE_ENABLED = 1
 _POSITION_AND_YAW = 0b1001_1111_1000  # ignore velocity, acceleration and yaw rate
 _LOCAL_NED = 1
@@ -76,12 +65,14 @@ class MavsdkAutopilot:
         """Find the vehicle and start telemetry; `timeout_s` is wall time, since an absent vehicle has no other."""
         try:
             await self._channel.open(self._address, timeout_s, HANDLERS, ground_station=self._ground_station)
-            await self._request_streams()
+            await request_streams(self._channel)
             await self._until(lambda: self._intake.heard, _TELEMETRY_S, "the autopilot sends no position and attitude")
         except BaseException:
             await self.close()
             raise
-        self._watcher = asyncio.create_task(self._watch(), name="link watch")
+        self._watcher = asyncio.create_task(
+            keep_streams(self._channel, lambda: self.telemetry.connected), name="link watch"
+        )
 
     async def close(self) -> None:
         """Stop everything that runs on behalf of the link; idempotent."""
@@ -103,43 +94,11 @@ class MavsdkAutopilot:
 
     async def parameters(self, names: Sequence[str]) -> Mapping[str, float]:
         """Values of the autopilot's parameters; those that it does not have are left out."""
-        from mavsdk.asyncio.plugins.param import ParamAsync
-        from mavsdk.plugins.param import ParamError, ParamResult
-
-        plugin = ParamAsync(self._channel.system)
-        values: dict[str, float] = {}
-        for name in names:
-            for get in (plugin.get_param_int, plugin.get_param_float):
-                try:
-                    values[name] = float(await self._channel.blocking(get(name)))
-                    break
-                except ParamError as error:
-                    if error.result in (ParamResult.NO_SYSTEM, ParamResult.CONNECTION_ERROR):
-                        raise AutopilotError(f"parameter {name}: the link to the autopilot is lost") from None
-                    if error.result is not ParamResult.WRONG_TYPE:
-                        break
-        return values
+        return await read_parameters(self._channel, names)
 
     async def set_parameter(self, name: str, value: float) -> None:
         """Change a parameter, of whichever type it is, and read it back."""
-        from mavsdk.asyncio.plugins.param import ParamAsync
-        from mavsdk.plugins.param import ParamError, ParamResult
-
-        plugin = ParamAsync(self._channel.system)
-        try:
-            try:
-                await self._channel.blocking(plugin.get_param_int(name))
-                await self._channel.blocking(plugin.set_param_int(name, round(value)))
-            except ParamError as error:
-                if error.result is not ParamResult.WRONG_TYPE:
-                    raise
-                await self._channel.blocking(plugin.set_param_float(name, float(value)))
-        except ParamError as error:
-            answer = error.result.name.lower().replace("_", " ")
-            raise AutopilotError(f"parameter {name} could not be set to {value:g}: {answer}") from None
-        held = (await self.parameters([name])).get(name)
-        if held is None or abs(held - value) > 1e-4 * max(1.0, abs(value)):
-            raise AutopilotError(f"parameter {name} was set to {value:g} and is {held}: the autopilot refuses it")
+        await write_parameter(self._channel, name, value)
 
     async def measured_speed(self, wall_s: float = 1.0) -> float | None:
         """The vehicle's seconds per wall second, by the stamps of its messages; None where they tell nothing."""
@@ -278,27 +237,6 @@ class MavsdkAutopilot:
     def _why(self) -> str:
         """The vehicle's own last words, where it has any."""
         return f" ({self._intake.last_text})" if self._intake.last_text else ""
-
-    async def _request_streams(self) -> None:
-        """Ask for the streams at our rates; one that the autopilot does not have is only missed."""
-        for message, interval in _INTERVALS_S.items():
-            result = await self._channel.command(
-                _SET_MESSAGE_INTERVAL, "set a message interval", message, interval * 1e6
-            )
-            if result != 0:
-                logger.info("message %d at %.3g s: %s", message, interval, px4_modes.RESULTS.get(result, result))
-
-    async def _watch(self) -> None:
-        """Ask for the streams again when the vehicle was away: it may have started anew."""
-        connected = True
-        while True:
-            await asyncio.sleep(0.25)
-            was, connected = connected, self.telemetry.connected
-            if connected and not was:
-                try:
-                    await self._request_streams()
-                except AutopilotError:
-                    connected = False
 
     async def _until(self, condition: Callable[[], bool], wall_s: float, complaint: str) -> None:
         for _ in range(round(wall_s / 0.02)):

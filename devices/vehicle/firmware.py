@@ -13,11 +13,11 @@ from devices.vehicle.control import NAN, Controller, Target
 from devices.vehicle.estimator import VALID_AFTER_S, Estimator
 from devices.vehicle.failsafes import Failsafes
 from devices.vehicle.gimbal import Gimbal
-from devices.vehicle.modes import Flight, Flying, Hold, Land, Mode, Offboard, Piloted, ReturnHome, Sticks, TakeOff
+from devices.vehicle.land_detector import LandDetector
+from devices.vehicle.modes import Flight, Flying, Hold, Land, Mode, Sticks, flying
 from devices.vehicle.parameters import ParameterTable
 from devices.vehicle.results import Result, Severity
 
-_LANDED_AFTER_S = 2.0
 _IDLE_THRUST = 1.5
 
 
@@ -47,15 +47,13 @@ class Firmware:
         self.target = Target()
         self.time_s = 0.0
         self.armed = False
-        self.landed = True
-        self.taking_off = False
+        self.land_detector = LandDetector()
         self.mode = self.intended = Mode.HOLD
         self.failsafes = Failsafes(self, battery, note, say)
         self.terminated = False
         self.setpoint_s: float | None = None
         self.pilot_s: float | None = None
         self._flying: Flying = Hold(estimate)
-        self._armed_s = self._landed_s = self._contact_s = 0.0
         self._before_landing = Mode.HOLD
         self._take_off_down: float | None = None
         self._resets = 0
@@ -71,8 +69,8 @@ class Firmware:
             self._say(Severity.CRITICAL, f"Arming denied: {reason}")
             self._note("arming_denied", reason=reason)
             return Result.TEMPORARILY_REJECTED
-        self.armed, self.landed, self.terminated = True, True, False
-        self._armed_s, self._landed_s = self.time_s, self.time_s
+        self.armed, self.terminated = True, False
+        self.land_detector.arm(self.time_s)
         estimate = self._estimate
         self.flight.home = (estimate.n, estimate.e, estimate.d)
         self._controller.reset(estimate)
@@ -109,12 +107,7 @@ class Firmware:
         """Hold, but over there. NaN keeps what is."""
         result = self.set_mode(Mode.HOLD)
         if result is Result.ACCEPTED and isinstance(self._flying, Hold):
-            hold = self._flying
-            hold.n, hold.e = (
-                (north_m if math.isfinite(north_m) else hold.n),
-                (east_m if math.isfinite(east_m) else hold.e),
-            )
-            hold.d, hold.yaw = (down_m if math.isfinite(down_m) else hold.d), (yaw if math.isfinite(yaw) else NAN)
+            self._flying.move_to(north_m, east_m, down_m, yaw)
         return result
 
     def offboard_setpoint(self, setpoint: Target) -> None:
@@ -146,6 +139,11 @@ class Firmware:
         self._intend(mode)
 
     # State
+
+    @property
+    def landed(self) -> bool:
+        """Whether it stands on the ground."""
+        return self.land_detector.landed
 
     @property
     def failsafe(self) -> str | None:
@@ -202,37 +200,32 @@ class Firmware:
         target = self.target = self._flying.target(self.flight, seconds)
         if self._flying.done:
             self._enter_next()
-        if self._watch_ground(target, seconds):
+        if self._rests(target, seconds):
             self._body.thrust_command = 0.0 if not self.armed else _IDLE_THRUST
             return None
         return target
 
-    def _watch_ground(self, target: Target, seconds: float) -> bool:
-        """Landed detection; True while the vehicle rests on the ground with idle motors."""
-        body = self._body
+    def _rests(self, target: Target, seconds: float) -> bool:
+        """Whether the vehicle is on the ground, with idle motors or none."""
+        ground, body = self.land_detector, self._body
         upward = target.vd < -0.05 or (target.d == target.d and target.d < self._estimate.d - 0.2)
-        if self.landed:
-            spooled = self.time_s - self._armed_s >= float(self.parameters["COM_SPOOLUP_TIME"])
+        if ground.landed:
+            spooled = self.time_s - ground.armed_s >= float(self.parameters["COM_SPOOLUP_TIME"])
             if upward and spooled and self.mode not in (Mode.HOLD, Mode.LAND, Mode.RTL):
-                self.landed, self.taking_off = False, True
-                self._contact_s = 0.0
+                ground.leave()
                 self._note("takeoff")
                 return False
-            since = self.time_s - self._landed_s
-            wait = "COM_DISARM_PRFLT" if self._landed_s == self._armed_s else "COM_DISARM_LAND"
-            if since >= float(self.parameters[wait]) > 0:
+            wait = float(self.parameters["COM_DISARM_LAND" if ground.flown else "COM_DISARM_PRFLT"])
+            if self.time_s - ground.landed_s >= wait > 0:
                 self.drop("auto")
             return True
-        self.taking_off = self.mode is Mode.TAKEOFF
-        self._contact_s = self._contact_s + seconds if body.on_ground and not upward else 0.0
-        if self._contact_s >= _LANDED_AFTER_S:
-            self.landed, self.taking_off = True, False
-            self._landed_s = self.time_s
-            self._note("landed", impact_m_s=round(body.impact_m_s, 3))
-            self._say(Severity.INFO, "Landing detected")
-            self._gimbal.release()
-            return True
-        return False
+        ground.taking_off = self.mode is Mode.TAKEOFF
+        if not ground.touches_down(body.on_ground and not upward, self.time_s, seconds):
+            return False
+        self._note("landed", impact_m_s=round(body.impact_m_s, 3))
+        self._say(Severity.INFO, "Landing detected")
+        self._gimbal.release()
+        return True
 
     # Mode changes
 
@@ -254,21 +247,10 @@ class Firmware:
         if mode is not self.mode:
             self._note("mode", mode=mode.name, before=self.mode.name, failsafe=self.failsafe)
         self.mode = mode
-        estimate = self._estimate
-        if mode is Mode.TAKEOFF:
-            least = self.flight.home[2] - float(self.parameters["MIS_TAKEOFF_ALT"])
-            down = least if self._take_off_down is None else min(self._take_off_down, least)
-            self._flying = TakeOff(estimate, down if self.landed else min(down, estimate.d))
-        elif mode is Mode.LAND:
-            self._flying = Land(estimate)
-        elif mode is Mode.RTL:
-            self._flying = ReturnHome(self.flight)
-        elif mode is Mode.OFFBOARD:
-            self._flying = Offboard(estimate)
-        elif mode.piloted:
-            self._flying = Piloted(estimate, holds_place=mode is Mode.POSCTL)
-        else:
-            self._flying = Hold(estimate)
+        down = self.flight.home[2] - float(self.parameters["MIS_TAKEOFF_ALT"])
+        if self._take_off_down is not None:
+            down = min(self._take_off_down, down)
+        self._flying = flying(mode, self.flight, down if self.landed else min(down, self._estimate.d))
 
     def drop(self, by: str) -> None:
         """Stop the motors, wherever the vehicle is."""

@@ -115,6 +115,13 @@ class Hold(_Spot):
         p = flight.parameters
         return Target(self.n, self.e, self.d, yaw=self.yaw, speed_max=float(p["MPC_XY_CRUISE"]))
 
+    def move_to(self, north_m: float, east_m: float, down_m: float, yaw: float) -> None:
+        """Stay over there. NaN keeps what is, but a yaw that was asked for before."""
+        self.n = north_m if math.isfinite(north_m) else self.n
+        self.e = east_m if math.isfinite(east_m) else self.e
+        self.d = down_m if math.isfinite(down_m) else self.d
+        self.yaw = yaw if math.isfinite(yaw) else NAN
+
 
 class TakeOff(_Spot):
     """Straight up, at a speed that grows with the ramp."""
@@ -214,3 +221,19 @@ class Piloted(_Spot):
 
 def _beyond(stick: float) -> float:
     return stick if abs(stick) > _STICK_DEADBAND else 0.0
+
+
+def flying(mode: Mode, flight: Flight, take_off_down_m: float) -> Flying:
+    """A mode, begun now; modes that nothing here flies hold."""
+    estimate = flight.estimate
+    if mode is Mode.TAKEOFF:
+        return TakeOff(estimate, take_off_down_m)
+    if mode is Mode.LAND:
+        return Land(estimate)
+    if mode is Mode.RTL:
+        return ReturnHome(flight)
+    if mode is Mode.OFFBOARD:
+        return Offboard(estimate)
+    if mode.piloted:
+        return Piloted(estimate, holds_place=mode is Mode.POSCTL)
+    return Hold(estimate)

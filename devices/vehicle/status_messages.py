@@ -93,7 +93,7 @@ def extended_sys_state(v: SimulatedVehicle) -> Any:
     landed = mavlink.MAV_LANDED_STATE_IN_AIR
     if f.landed:
         landed = mavlink.MAV_LANDED_STATE_ON_GROUND
-    elif f.taking_off:
+    elif f.land_detector.taking_off:
         landed = mavlink.MAV_LANDED_STATE_TAKEOFF
     elif f.mode is Mode.LAND:
         landed = mavlink.MAV_LANDED_STATE_LANDING

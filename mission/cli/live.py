@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import select
-import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
+from mission.cli.keyboard import keys_pressed, prompt
 from mission.cli.scene import Scene, VisionRate, take_scene
 from mission.record.follower import JournalFollower
 
@@ -91,7 +90,7 @@ class PlainView(_Watcher):
         super().start(executive)
 
     def ask(self, question: str) -> bool:
-        return _prompt(question) if sys.stdin.isatty() and sys.stdout.isatty() else False
+        return prompt(question) if sys.stdin.isatty() and sys.stdout.isatty() else False
 
     def close(self) -> None:
         super().close()
@@ -150,7 +149,7 @@ class LiveView(_Watcher):
 
     def ask(self, question: str) -> bool:
         if self._thread is None:
-            return _prompt(question)
+            return prompt(question)
         with self._asking:
             answered = threading.Event()
             answers: list[bool] = []
@@ -172,7 +171,7 @@ class LiveView(_Watcher):
         from mission.cli.panel import draw
 
         console = Console()
-        with _keys() as pressed, Live(console=console, auto_refresh=False, transient=True) as live:
+        with keys_pressed() as pressed, Live(console=console, auto_refresh=False, transient=True) as live:
             while not self._stop.is_set():
                 self._events = [*self._events, *self._journal.news()][-8:]
                 question, scene = self._question, self._scene(executive)
@@ -207,49 +206,3 @@ class LiveView(_Watcher):
     def _settle(self, yes: bool) -> None:
         self._question = None
         self._answer(yes)
-
-
-def _prompt(question: str) -> bool:
-    """Ask on a line of its own. Ctrl-C ends the program, whoever handles it otherwise: nothing has taken off yet."""
-    ours = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, signal.default_int_handler) if ours else None
-    try:
-        return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
-    except EOFError:
-        return False
-    finally:
-        if before is not None:
-            signal.signal(signal.SIGINT, before)
-
-
-@contextlib.contextmanager
-def _keys() -> Iterator[Callable[[float], str]]:
-    """A function that waits so long for keys and returns those pressed. The terminal is as before afterwards."""
-    import termios
-    import tty
-
-    try:
-        before: list[Any] | None = termios.tcgetattr(sys.stdin)
-        tty.setcbreak(sys.stdin)
-    except (termios.error, ValueError, OSError):
-        before = None
-
-    def pressed(timeout_s: float) -> str:
-        if before is None:
-            time.sleep(timeout_s)
-            return ""
-        ready, _, _ = select.select([sys.stdin], [], [], timeout_s)
-        if not ready:
-            return ""
-        import os
-
-        keys = os.read(sys.stdin.fileno(), 32)
-        if not keys:  # the terminal went away: there is nobody to press anything
-            time.sleep(timeout_s)
-        return keys.decode(errors="ignore")
-
-    try:
-        yield pressed
-    finally:
-        if before is not None:
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

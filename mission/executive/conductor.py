@@ -19,7 +19,7 @@ from mission.executive.chronicle import Chronicle
 from mission.executive.decision import Autonomy, autonomy_after, decide
 from mission.executive.events import EVENTS, event
 from mission.executive.gate import Gate, guard_services
-from mission.executive.helm import PULSE_S, Helm
+from mission.executive.helm import Helm
 from mission.executive.journal import SLOWEST_DISK_S, Journal
 from mission.executive.machine import Machine
 from mission.executive.operator import at_the_keyboard
@@ -39,12 +39,9 @@ if TYPE_CHECKING:
     from mission.executive.clock import Clock
     from mission.executive.services import Services
 
-KEEP_S = 0.5  # how often the journal is told what a behaviour has found out
-_MOST_FAULTS = 3
-
 
 class Conductor:
-    """Carries every event to its end before it looks at the next. One task calls it, turn by turn.
+    """Carries every event to its end before the next. One task hands them to it.
 
     services: put behind a gate, in place, so that an abandoned behaviour cannot steer. ask: how an operator is asked;
     without it a transition that needs a yes waits for `confirm`. resume: where an interrupted run goes on. gone:
@@ -84,8 +81,6 @@ class Conductor:
         self._ended: str | None = None
         self._why: str | None = None
         self._silence = Silence(gone)
-        self._faults = 0
-        self._kept_s = 0.0
 
     @property
     def state(self) -> str:
@@ -120,52 +115,6 @@ class Conductor:
     def note(self, command: str, who: str, **about: Any) -> None:
         """Write an operator's act to the journal."""
         self._chronicle.acts(command, who, **about)
-
-    async def _turn(self) -> None:
-        """Handle one event, or wait for one until something is due."""
-        self._helm.beat()
-        lost = self._silence.lost(asyncio.get_running_loop().time(), self._autopilot.telemetry.link_age_s)
-        if lost is not None:
-            self._give_up(lost)
-            return
-        try:
-            await self._act_on_time()
-            queued = self._queue.pop()
-            if queued is not None:
-                await self._handle(queued)
-                return
-        except Exception as error:
-            await self._fault(error)
-        due_s, patience = self._timing.next_s(), PULSE_S
-        if due_s is not None:
-            patience = min(patience, max((due_s - self._clock.now()) / self._clock.speed, 0.0))
-        with suppress(TimeoutError):
-            async with asyncio.timeout(patience):
-                await self._queue.arrived.wait()
-
-    def _give_up(self, why: str) -> None:
-        """End where no transition can: nothing more is waited for."""
-        if self._ended is None:
-            self.services.log.error("run given up", why=why, state=self.state)
-            self._ended, self._why = "aborted", why
-
-    async def _act_on_time(self) -> None:
-        """Deadlines cancel the work that they time; transitions whose delay is over are taken if they still can be."""
-        now = self._clock.now()
-        if now - self._kept_s >= KEEP_S and not len(self._queue):
-            self._kept_s = now
-            self._chronicle.found_out(self.state)
-        late = self._timing.overdue(now)
-        if late is not None:
-            self._timing = self._timing.expired(late)
-            if self._questions.waiting is None:
-                self._queue.put("timed_out", {"state": late}, origin=late)
-                await self._stop()
-                self._helm.hold()
-        ripe = self._timing.due(now)
-        if ripe is not None:
-            self._timing = self._timing.without(ripe)
-            self._queue.put(ripe.event, {}, only=ripe.transition)
 
     async def _handle(self, queued: Queued) -> None:
         if queued.activation is not None and queued.activation != self._work.activation:
@@ -258,17 +207,6 @@ class Conductor:
             self._ended = "aborted"
         elif queued.activation is not None and queued.name not in EVENTS:
             self._queue.put("behaviour_failed", {"error": f"nothing answers its outcome {queued.name!r}"})
-
-    async def _fault(self, error: Exception) -> None:
-        """An error of the executive itself: abort, and if that does not help either, leave the vehicle holding."""
-        self._faults += 1
-        self.services.log.exception("executive failed", state=self.state)
-        self._chronicle.fails(error)
-        if self._faults >= _MOST_FAULTS:
-            await self._stop()
-            self._ended = "aborted"
-        else:
-            self._queue.put("abort", {"error": type(error).__name__})
 
     def _snapshot(self, was_ours: bool = True) -> Snapshot:
         state = self.mission.states[self.state]

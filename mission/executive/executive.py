@@ -5,18 +5,19 @@ from __future__ import annotations
 import asyncio
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mission.behaviours.behaviour import behaviours
 from mission.executive.conductor import Conductor
 from mission.executive.events import event
+from mission.executive.helm import PULSE_S
 from mission.executive.journal import SLOWEST_DISK_S
 from mission.executive.machine import entries
 from mission.executive.resume import take_up
 from mission.executive.status import Status, possible
 
-if TYPE_CHECKING:
-    pass
+KEEP_S = 0.5  # how often the journal is told what a behaviour has found out
+_MOST_FAULTS = 3
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Executive(Conductor):
 
     interrupted = False
     _loop: asyncio.AbstractEventLoop | None = None
+    _faults = 0
+    _kept_s = 0.0
 
     async def run(self) -> Outcome:
         """Fly until a final state is reached."""
@@ -65,6 +68,63 @@ class Executive(Conductor):
             self._questions.close()
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
+
+    async def _turn(self) -> None:
+        """Handle one event, or wait for one until something is due."""
+        self._helm.beat()
+        lost = self._silence.lost(asyncio.get_running_loop().time(), self._autopilot.telemetry.link_age_s)
+        if lost is not None:
+            self._give_up(lost)
+            return
+        try:
+            await self._act_on_time()
+            queued = self._queue.pop()
+            if queued is not None:
+                await self._handle(queued)
+                return
+        except Exception as error:
+            await self._fault(error)
+        due_s, patience = self._timing.next_s(), PULSE_S
+        if due_s is not None:
+            patience = min(patience, max((due_s - self._clock.now()) / self._clock.speed, 0.0))
+        with suppress(TimeoutError):
+            async with asyncio.timeout(patience):
+                await self._queue.arrived.wait()
+
+    def _give_up(self, why: str) -> None:
+        """End where no transition can: nothing more is waited for."""
+        if self._ended is None:
+            self.services.log.error("run given up", why=why, state=self.state)
+            self._ended, self._why = "aborted", why
+
+    async def _act_on_time(self) -> None:
+        """Deadlines cancel the work that they time; transitions whose delay is over are taken if they still can be."""
+        now = self._clock.now()
+        if now - self._kept_s >= KEEP_S and not len(self._queue):
+            self._kept_s = now
+            self._chronicle.found_out(self.state)
+        late = self._timing.overdue(now)
+        if late is not None:
+            self._timing = self._timing.expired(late)
+            if self._questions.waiting is None:
+                self._queue.put("timed_out", {"state": late}, origin=late)
+                await self._stop()
+                self._helm.hold()
+        ripe = self._timing.due(now)
+        if ripe is not None:
+            self._timing = self._timing.without(ripe)
+            self._queue.put(ripe.event, {}, only=ripe.transition)
+
+    async def _fault(self, error: Exception) -> None:
+        """An error of the executive itself: abort, and if that does not help either, leave the vehicle holding."""
+        self._faults += 1
+        self.services.log.exception("executive failed", state=self.state)
+        self._chronicle.fails(error)
+        if self._faults >= _MOST_FAULTS:
+            await self._stop()
+            self._ended = "aborted"
+        else:
+            self._queue.put("abort", {"error": type(error).__name__})
 
     def raise_event_threadsafe(self, name: str, **data: Any) -> None:
         """The same from any thread."""
