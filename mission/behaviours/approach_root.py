@@ -1,4 +1,4 @@
-"""From the survey's distance to the blade's root, slower the nearer."""
+"""From the survey's distance to the blade, at its root or where it is to begin, slower the nearer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ApproachRoot(Parameters):
 
     standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to the blade at the end")
     stage_m: float = Field(9.0, ge=6, le=20, description="distance at which the creeping begins")
-    station_m: float = Field(4.0, ge=2, le=15, description="where along the blade, from the hub's centre")
+    station_m: float = Field(4.0, ge=2, le=150, description="where along the blade, from the hub's centre")
     speed_m_s: float = Field(4.0, gt=0, le=8, description="speed to the staging point")
     creep_m_s: float = Field(0.6, gt=0, le=1.5, description="speed from there on")
 
@@ -41,8 +41,8 @@ SEEN_S = 1.0  # the blade must have been tracked without a break for so long bef
 async def approach_root(services: Services, parameters: ApproachRoot) -> str:
     """Fly in front of the blade's root, then creep toward it until the blade is seen, measured and three metres away.
 
-    In front of where the inspection goes on, where it was interrupted before: a little before the end of the pass that
-    was begun, or at the tip after the pass that led there.
+    In front of another station where `station_m` says so; and in front of where the inspection goes on, where it was
+    interrupted before: a little before the end of the pass that was begun, or at the tip after the pass that led there.
 
     Until the cameras measure the blade, the range finder limits how near the vehicle goes.
     """
@@ -102,16 +102,17 @@ def goes_on_at(memory: Memory, root_m: float, tip_m: float) -> tuple[float, floa
     """Station and offset (m, blade frame) at which the inspection goes on; at the root where it has yet to begin."""
     import numpy as np
 
+    outermost = tip_m - TIP_MARGIN_M
     begun = [side for side in memory.inspected if side not in memory.passes_done]
     done = [side for side in memory.inspected if side in memory.passes_done]
     if not begun and (not done or len(done) > 1):
-        return root_m, 0.0
+        return min(root_m, outermost), 0.0
     side = (begun or done)[-1]
     stretch = memory.inspected[side]
     travel = float(np.sign(stretch.to_m - stretch.from_m))
     station = stretch.to_m - (OVERLAP_M * travel if begun else 0.0)
     inward = -INSIDE_M if side == "leading" else INSIDE_M
-    return float(np.clip(station, root_m, max(root_m, tip_m - TIP_MARGIN_M))), stretch.edge_m + inward
+    return float(np.clip(station, min(root_m, outermost), outermost)), stretch.edge_m + inward
 
 
 def _excess(estimate: BladeEstimate, range_m: float | None, standoff_m: float) -> float:

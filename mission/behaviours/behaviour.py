@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -36,7 +36,7 @@ class Behaviour:
     outcomes: name → what it means, the only values `run` may return. airborne: it expects to be flying while it runs,
     or None where it does not care. needs_vision: it cannot work without images. keeps_standoff: it keeps its parameter
     `standoff_m` all the time, so that the monitor may hold it to that. laser: it lights the laser; those that need
-    images do unless they say otherwise.
+    images do unless they say otherwise. only_with: outcome → the parameter without which it never comes.
     """
 
     name: str
@@ -48,6 +48,15 @@ class Behaviour:
     text: str
     keeps_standoff: bool = False
     laser: bool = False
+    only_with: Mapping[str, str] = field(default_factory=dict)
+
+    def outcomes_with(self, parameters: Parameters | None) -> Mapping[str, str]:
+        """The outcomes that may come when it runs with these parameters."""
+        return {
+            name: text
+            for name, text in self.outcomes.items()
+            if name not in self.only_with or getattr(parameters, self.only_with[name], None) is not None
+        }
 
 
 _REGISTRY: dict[str, Behaviour] = {}
@@ -61,6 +70,7 @@ def behaviour(
     needs_vision: bool = False,
     keeps_standoff: bool = False,
     laser: bool | None = None,
+    only_with: Mapping[str, str] | None = None,
 ) -> Callable[[Callable[[Services, P], Awaitable[str]]], Callable[[Services, P], Awaitable[str]]]:
     """Register a coroutine as the behaviour of its own name; users read its docstring in `mission list behaviours`."""
 
@@ -71,7 +81,7 @@ def behaviour(
         text = (run.__doc__ or "").strip()
         lit = needs_vision if laser is None else laser
         _REGISTRY[name] = Behaviour(
-            name, run, parameters, dict(outcomes), airborne, needs_vision, text, keeps_standoff, lit
+            name, run, parameters, dict(outcomes), airborne, needs_vision, text, keeps_standoff, lit, only_with or {}
         )
         return run
 

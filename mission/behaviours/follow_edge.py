@@ -1,4 +1,4 @@
-"""Along the blade on one of its sides, camera on the edge, until its end."""
+"""Along the blade on one of its sides, camera on the edge, until its end or a place before it."""
 
 from __future__ import annotations
 
@@ -22,6 +22,12 @@ class FollowEdge(Parameters):
     standoff_m: float = Field(3.0, ge=2.5, le=8, description="distance to the nearest point of the blade")
     speed_m_s: float = Field(0.8, gt=0, le=2, description="speed along the blade")
     record: bool = Field(True, description="whether frames are kept for the inspector")
+    until_m: float | None = Field(
+        None,
+        ge=2,
+        le=150,
+        description="station where it ends, from the hub's centre; without it, the blade's end",
+    )
 
 
 EDGE_PATIENCE_S = 8.0  # the wanted edge unseen for so long, though the blade is seen
@@ -38,7 +44,9 @@ NEAREST_ROOT_M = 2.6  # never nearer to the hub's centre than this
         "tip_detected": "several sightings of a tip agree",
         "root_detected": "the chord has fallen and the position confirms the root",
         "edge_lost": "the blade is seen, the wanted edge is not; or the blade is longer than it should be",
+        "station_reached": "the place that `until_m` names, before the blade's end",
     },
+    only_with={"station_reached": "until_m"},
     parameters=FollowEdge,
     needs_vision=True,
     keeps_standoff=True,
@@ -88,9 +96,19 @@ async def follow_edge(services: Services, parameters: FollowEdge) -> str:
             elif _at_root(services, root, estimate):
                 done(services, parameters)
                 return "root_detected"
+            if reached(parameters, estimate.station_m):
+                done(services, parameters)
+                return "station_reached"
     finally:
         perception.record(None)
     raise AssertionError("ticks never end")
+
+
+def reached(parameters: FollowEdge, station_m: float) -> bool:
+    """Whether the pass has come as far as it was told to."""
+    if parameters.until_m is None:
+        return False
+    return station_m >= parameters.until_m if parameters.toward == "tip" else station_m <= parameters.until_m
 
 
 def done(services: Services, parameters: FollowEdge) -> None:

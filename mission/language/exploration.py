@@ -180,20 +180,19 @@ class Exploration:
 def happening(mission: Mission, leaf: str) -> Iterator[tuple[str, str]]:
     """Everything that can happen in a leaf: (event, the state that it is about)."""
     state = mission.states[leaf]
-    behaviour = behaviour_of(state)
+    behaviour, outcomes = behaviour_of(state), outcomes_of(state)
     for event in EVENTS.values():
         if event.name in ("timed_out", *_BY_REQUEST) or (event.name in _ABOUT_BEHAVIOURS and behaviour is None):
             continue
-        if event.name == "failed" and (behaviour is None or "failed" not in behaviour.outcomes):
+        if event.name == "failed" and "failed" not in outcomes:
             continue
         yield event.name, leaf
     for outer in enclosing(leaf):
         if mission.states[outer].timeout_s is not None:
             yield "timed_out", outer
-    if behaviour is not None:
-        for outcome in behaviour.outcomes:
-            if outcome not in EVENTS:
-                yield outcome, leaf
+    for outcome in outcomes:
+        if outcome not in EVENTS:
+            yield outcome, leaf
 
 
 _ABOUT_BEHAVIOURS = ("behaviour_failed", "behaviour_stuck")
@@ -210,6 +209,12 @@ def possible(mission: Mission, origin: str, event: str) -> Iterator[Transition]:
 def behaviour_of(state: State) -> Behaviour | None:
     """What a state does."""
     return behaviours().get(state.do) if state.do else None
+
+
+def outcomes_of(state: State) -> Mapping[str, str]:
+    """How what a state does can end, with the parameters that it is given: name → what it means."""
+    behaviour = behaviour_of(state)
+    return behaviour.outcomes_with(state.parameters) if behaviour is not None else {}
 
 
 def safety_events() -> tuple[Event, ...]:

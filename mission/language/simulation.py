@@ -21,7 +21,7 @@ from mission.executive.timing import Timing, Waiting
 from mission.language import semantics
 from mission.language.diagnostics import near_or_choices
 from mission.language.document import Mission, Transition, enclosing, load
-from mission.language.exploration import behaviour_of
+from mission.language.exploration import behaviour_of, outcomes_of
 from mission.language.semantics import Configuration, Step
 
 
@@ -122,7 +122,7 @@ class Simulation:
         if within is not None and within not in self.configuration.active:
             raise SimulationError(f"{within!r} is not active: the mission is in {self.state!r}")
         behaviour = behaviour_of(self.mission.states[self.state])
-        can = list(behaviour.outcomes) if behaviour is not None else []
+        can = outcomes_of(self.mission.states[self.state])
         if event not in EVENTS and event not in can:
             does = f"{behaviour.name} ends with {', '.join(can)}" if behaviour is not None else "it does nothing"
             raise SimulationError(f"{event!r} cannot happen in {self.state!r}: {does}")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mission.executive.events import EVENTS
 from mission.language.diagnostics import Diagnostic, choices, suggestion
 from mission.language.document import Transition, enclosing
-from mission.language.exploration import Exploration, behaviour_of
+from mission.language.exploration import Exploration, behaviour_of, outcomes_of
 
 
 def unanswered_outcomes(exploration: Exploration) -> Iterator[Diagnostic]:
@@ -18,7 +18,7 @@ def unanswered_outcomes(exploration: Exploration) -> Iterator[Diagnostic]:
         behaviour = behaviour_of(state)
         if behaviour is None:
             continue
-        for outcome, text in behaviour.outcomes.items():
+        for outcome, text in outcomes_of(state).items():
             if not any(transition.event == outcome for transition in mission.handlers(leaf, outcome)):
                 if outcome in EVENTS and any(True for _ in mission.handlers(leaf, outcome)):
                     continue
@@ -38,12 +38,7 @@ def never_raised(exploration: Exploration) -> Iterator[Diagnostic]:
             if not bounded:
                 yield Diagnostic(transition.location, "M216", "timed_out is never raised here: no timeout_s is set")
         elif transition.event not in EVENTS:
-            outcomes = {
-                name
-                for leaf in leaves
-                if (behaviour := behaviour_of(mission.states[leaf])) is not None
-                for name in behaviour.outcomes
-            }
+            outcomes = {name for leaf in leaves for name in outcomes_of(mission.states[leaf])}
             if transition.event not in outcomes:
                 message = f"nothing {_within(transition)} can end with {transition.event!r}"
                 hint = suggestion(transition.event, outcomes) or choices(outcomes)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from mission.behaviours.approach_root import OVERLAP_M, TIP_MARGIN_M, goes_on_at
-from mission.behaviours.follow_edge import FollowEdge, note_progress
+from mission.behaviours.behaviour import behaviours
+from mission.behaviours.follow_edge import FollowEdge, note_progress, reached
 from mission.executive.services import Memory, Stretch
 
 ROOT_M, TIP_M = 4.0, 40.0
@@ -33,6 +34,27 @@ def begun(done: tuple[str, ...] = (), **inspected: tuple[float, float]) -> Memor
 )  # fmt: skip
 def test_it_goes_on_a_little_before_where_it_stopped(memory: Memory, station_m: float, offset_m: float) -> None:
     assert goes_on_at(memory, ROOT_M, TIP_M) == pytest.approx((station_m, offset_m))
+
+
+def test_a_part_of_a_blade_begins_where_it_was_told_to_but_never_beyond_the_tip() -> None:
+    assert goes_on_at(begun(), 28.0, TIP_M) == (28.0, 0.0)
+    assert goes_on_at(begun(), 60.0, TIP_M) == (TIP_M - TIP_MARGIN_M, 0.0)
+    assert goes_on_at(begun(leading=(28.0, 39.9)), 28.0, TIP_M) == pytest.approx((39.9 - OVERLAP_M, 0.1))
+
+
+@pytest.mark.parametrize(
+    "toward, until_m, before_m, after_m", [("tip", 30.0, 29.9, 30.1), ("root", 28.0, 28.1, 27.9)]
+)  # fmt: skip
+def test_a_pass_ends_where_it_was_told_to(toward: str, until_m: float, before_m: float, after_m: float) -> None:
+    told = FollowEdge(side="leading", toward=toward, until_m=until_m)
+    assert not reached(told, before_m) and reached(told, after_m)
+    assert not reached(FollowEdge(side="leading", toward=toward), after_m)
+
+
+def test_a_pass_can_end_at_a_place_only_where_one_is_named() -> None:
+    follow = behaviours()["follow_edge"]
+    assert "station_reached" not in follow.outcomes_with(OUT)
+    assert set(follow.outcomes_with(OUT.model_copy(update={"until_m": 30.0}))) == set(follow.outcomes)
 
 
 def test_a_pass_remembers_how_far_it_has_come_and_never_less() -> None:
