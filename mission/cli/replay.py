@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import sys
+import time
+from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from mission.executive.replay import Played
+    from mission.language.document import Mission
 
 
 def replay(
@@ -14,7 +21,7 @@ def replay(
         float | None, typer.Option(min=0.01, help="Mission seconds per wall second; without it, as fast as it goes.")
     ] = None,
     begin: Annotated[float, typer.Option("--from", metavar="SECONDS", help="Show nothing before this time.")] = 0.0,
-    step: Annotated[bool, typer.Option("--step", help="Wait for the Enter key after every line.")] = False,
+    step: Annotated[bool, typer.Option("--step", help="Wait for Enter, or a line of input, after every line.")] = False,
     mission: Annotated[
         Path | None, typer.Option(help="Play it through another mission file: does a change alter what happens?")
     ] = None,
@@ -32,8 +39,6 @@ def replay(
 
     Exit code 0 when everything happened as recorded, 1 at a difference.
     """
-    import asyncio
-
     from mission.cli.errors import ABORTED, USAGE, CommandError
     from mission.executive.resume import ResumeError
     from mission.language.document import load
@@ -46,44 +51,47 @@ def replay(
         if part != folder and not part.journal.exists():
             continue  # it was cut off before its first decision
         try:
-            difference, events, transitions = asyncio.run(_play(part.journal, document, speed, begin, step))
+            difference, events, transitions, whole = _play(part.journal, document, speed, begin, step)
         except ResumeError as error:
             raise CommandError(str(error), USAGE) from None
         if difference is not None:
             raise CommandError(difference, ABORTED)
-        print(f"{part.name}: {events} events, {transitions} transitions, all as recorded")
+        so_far = "" if whole else " so far: the input ended"
+        print(f"{part.name}: {events} events, {transitions} transitions, all as recorded{so_far}")
+        if not whole:
+            return
 
 
-async def _play(
-    journal: Path, document: object, speed: float | None, begin: float, step: bool
-) -> tuple[str | None, int, int]:
+def _play(
+    journal: Path, document: Mission, speed: float | None, begin: float, step: bool
+) -> tuple[str | None, int, int, bool]:
+    """The first difference, how many events and transitions were played, and whether that is all of them."""
     import asyncio
 
     from mission.executive.replay import replay
 
     events = transitions = 0
     before = begin
-    async for played in replay(journal, document):  # type: ignore[arg-type]
-        if played.difference is not None:
-            return f"{journal}:{played.line}: {played.event}: {played.difference}", events, transitions
-        if played.step is None and played.led_to == "transition":
-            continue
-        events += 1
-        transitions += played.step is not None
-        if played.t < begin:
-            continue
-        if speed is not None:
-            await asyncio.sleep(max(played.t - before, 0.0) / speed)
-            before = played.t
-        where = f"→ {played.state}" if played.step is not None else f"({played.led_to} in {played.state})"
-        print(f"{played.t:9.2f} s  {played.event:20} {where}", flush=True)
-        if step:
-            await asyncio.to_thread(_wait_for_enter)
-    return None, events, transitions
+    with asyncio.Runner() as runner:  # entered for each line: a person is waited for outside, where Ctrl-C is heard
+        recorded = replay(journal, document)
+        while (played := runner.run(_next(recorded))) is not None:
+            if played.difference is not None:
+                return f"{journal}:{played.line}: {played.event}: {played.difference}", events, transitions, True
+            if played.step is None and played.led_to == "transition":
+                continue
+            events += 1
+            transitions += played.step is not None
+            if played.t < begin:
+                continue
+            if speed is not None:
+                time.sleep(max(played.t - before, 0.0) / speed)
+                before = played.t
+            where = f"→ {played.state}" if played.step is not None else f"({played.led_to} in {played.state})"
+            print(f"{played.t:9.2f} s  {played.event:20} {where}", flush=True)
+            if step and not sys.stdin.readline():
+                return None, events, transitions, False
+    return None, events, transitions, True
 
 
-def _wait_for_enter() -> None:
-    try:
-        input()
-    except EOFError:
-        raise KeyboardInterrupt from None
+async def _next(recorded: AsyncIterator[Played]) -> Played | None:
+    return await anext(recorded, None)

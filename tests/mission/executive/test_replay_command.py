@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -48,6 +49,16 @@ def test_it_prints_every_event_and_says_that_all_was_the_same(logs: Path, capsys
 def test_it_begins_where_it_is_asked_to_and_goes_as_fast(logs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", "latest", "--record", str(logs), "--from", "9", "--speed", "1000"]) == 0
     assert "square.north" not in capsys.readouterr().out
+
+
+def test_it_steps_by_lines_of_input_and_ends_with_them(
+    logs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    assert main(["replay", "latest", "--record", str(logs), "--step"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 3
+    assert "2 events, 2 transitions, all as recorded so far: the input ended" in lines[2]
 
 
 def test_a_changed_mission_shows_where_it_differs(logs: Path, capsys: pytest.CaptureFixture[str]) -> None:
