@@ -20,6 +20,13 @@ from mission.language.turbine_file import TurbineFile
 SHIPPED = Path(__file__).with_name("mission.schema.json")
 _REFERENCE = {"type": "string", "pattern": r"\$\{[A-Za-z_]\w*\}"}
 _FILES = {"oneOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
+_COMPOSING = {
+    "extends": {**_FILES, "description": "files that this is laid over"},
+    "include": {**_FILES, "description": "files that this is laid over, after those of extends"},
+}
+_NESTED = ("properties", "$defs")
+_LISTED = ("anyOf", "oneOf", "allOf")
+_WRAPPED = ("additionalProperties", "items", "then")
 
 
 def schema_text() -> str:
@@ -67,7 +74,7 @@ def schema() -> dict[str, Any]:
         {
             "do": {"enum": sorted(behaviours())},
             "with": {"type": "object"},
-            "timeout_s": _or_reference({"type": "number", "exclusiveMinimum": 0}),
+            "timeout_s": {"type": "number", "exclusiveMinimum": 0},
             "on": {"$ref": "#/$defs/on"},
             "initial": {"type": "string"},
             "states": {"$ref": "#/$defs/states"},
@@ -80,12 +87,11 @@ def schema() -> dict[str, Any]:
         },
         states_in.FIELDS,
     )
-    state["include"] = {**_FILES, "description": "files whose state this one is laid over"}
     definitions["state"] = _object(state) | {
         "allOf": [
             {
                 "if": {"properties": {"do": {"const": name}}, "required": ["do"]},
-                "then": {"properties": {"with": _model(behaviour.parameters, definitions, references=True)}},
+                "then": {"properties": {"with": _model(behaviour.parameters, definitions)}},
             }
             for name, behaviour in behaviours().items()
         ]
@@ -115,14 +121,14 @@ def schema() -> dict[str, Any]:
         },
         mission_in.FIELDS,
     )
-    properties["extends"] = {**_FILES, "description": "missions that this one is laid over"}
-    return {
+    whole = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A mission",
         **_object(properties),
-        "anyOf": [{"required": ["mission", "version", "initial", "states"]}, {"required": ["extends"]}],
+        "anyOf": [{"required": ["mission", "version", "initial", "states"]}, *_composed()],
         "$defs": dict(sorted(definitions.items())),
     }
+    return dict(_overlay(whole))
 
 
 def _object(properties: dict[str, Any]) -> dict[str, Any]:
@@ -135,14 +141,43 @@ def _described(properties: dict[str, Any], texts: dict[str, str]) -> dict[str, A
     return {key: {**value, "description": texts[key]} for key, value in properties.items()}
 
 
-def _or_reference(value: dict[str, Any]) -> dict[str, Any]:
-    return {"anyOf": [value, _REFERENCE]}
+def _composed() -> list[dict[str, Any]]:
+    return [{"required": [key]} for key in _COMPOSING]
 
 
-def _model(model: type[BaseModel], definitions: dict[str, Any], references: bool = False) -> dict[str, Any]:
+def _overlay(node: dict[str, Any]) -> dict[str, Any]:
+    """The same schema for files that are laid over others: any mapping may take what it lacks from a file, a value may
+    be a reference, and `~` removes what was inherited."""
+    found: dict[str, Any] = {}
+    for key, value in node.items():
+        if key in _NESTED:
+            found[key] = {name: _overlay(inner) for name, inner in value.items()}
+        elif key in _LISTED:
+            found[key] = [_overlay(inner) for inner in value]
+        else:
+            found[key] = _overlay(value) if key in _WRAPPED and isinstance(value, dict) else value
+    if found.get("type") == "object" and "properties" in found:
+        values = {name: _removable(value) for name, value in found["properties"].items()}
+        found["properties"] = {**values, **_COMPOSING}
+        if needed := found.pop("required", None):
+            found["anyOf"] = [{"required": needed}, *_composed()]
+    if found.get("type") == "object" and isinstance(found.get("additionalProperties"), dict):
+        found["additionalProperties"] = _removable(found["additionalProperties"])
+        found["properties"] = dict(_COMPOSING)
+    return found
+
+
+def _removable(value: dict[str, Any]) -> dict[str, Any]:
+    """A value, a reference to one, or nothing; what is said about it stays outermost, where editors look."""
+    said = {key: value[key] for key in ("description", "default", "title", "examples") if key in value}
+    own = {key: inner for key, inner in value.items() if key not in said}
+    if not own or own == {"type": "object"}:
+        return value
+    return {**said, "anyOf": [own, _REFERENCE, {"type": "null"}]}
+
+
+def _model(model: type[BaseModel], definitions: dict[str, Any]) -> dict[str, Any]:
     """A model's schema, its own definitions moved to the common ones."""
     own = model.model_json_schema(ref_template="#/$defs/{model}")
     definitions.update(own.pop("$defs", {}))
-    if references:
-        own["properties"] = {name: _or_reference(value) for name, value in own.get("properties", {}).items()}
     return own

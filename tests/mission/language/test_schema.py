@@ -42,6 +42,27 @@ def test_shipped_missions_fit_the_schema_as_written_and_as_resolved(path: Path, 
     assert [error.message for error in validator.iter_errors(json.loads(json.dumps(resolved)))] == []
 
 
+LAID_OVER = """\
+extends: v80_blade.yaml
+mission: other
+rig: {extends: rigs/simulated.yaml, speed: 3}
+site: {extends: sites/coast.yaml, turbine_north_m: "${north_m}"}
+parameters: {north_m: 70, wait_s: 3}
+limits: {wind_m_s: "${wait_s}", clearance_m: ~}
+states:
+  launch: ~
+  inspect: {include: parts/look.yaml, on: {paused: ~, vision_lost: {to: abort, after_s: "${wait_s}"}}}
+"""
+
+
+def test_what_is_laid_over_another_file_fits_the_schema(validator: Any) -> None:
+    whole = plain(parse(LAID_OVER, "file", []))
+    assert [error.message for error in validator.iter_errors(whole)] == []
+    for before, after in (("speed: 3", "speeds: 3"), ("${wait_s}", "wait_s"), ("{include: parts", "{includes: parts")):
+        assert before in LAID_OVER
+        assert list(validator.iter_errors(plain(parse(LAID_OVER.replace(before, after), "file", [])))), after
+
+
 @pytest.mark.parametrize(
     ("before", "after"),
     [
