@@ -101,12 +101,18 @@ class Conductor:
             self._chronicle.acts(name, str(data["by"]), soon=True, **about)  # with the event, one write
         self._queue.put(name, data)
 
+    @property
+    def question(self) -> Question | None:
+        """What an operator may answer now."""
+        return self._questions.open
+
     def confirm(self, yes: bool) -> str:
-        """Answer the question that waits; returns what becomes of it, for the operator to read."""
-        pending = self._questions.take()
+        """Answer the open question; returns what becomes of it, for the operator to read."""
+        pending = self._questions.answer(yes)
         if pending is None:
             return "nothing waits for an answer"
         if not yes:
+            self.services.progress.text = f"{pending.name} was refused; `step` follows it after all"
             return f"{pending.name} is not followed; the vehicle holds in {self.state}"
         about = {"activation": pending.activation, "origin": pending.origin, "only": pending.only}
         self._queue.put(pending.name, pending.data, confirmed=True, **about)
@@ -120,7 +126,7 @@ class Conductor:
         if queued.activation is not None and queued.activation != self._work.activation:
             self._chronicle.happened(queued, "stale", self.state, {})
             return
-        if queued.name == "step" and self._questions.waiting is not None:
+        if queued.name == "step" and self._questions.open is not None:
             self._chronicle.happened(queued, "confirmation", self.state, {})
             self.confirm(True)
             return
@@ -153,7 +159,7 @@ class Conductor:
         await self._machine.take(queued.name, quantities, queued.origin, transition, step)
         now = self._clock.now()
         self._timing = self._timing.stepping(self.mission, step, now)
-        self._questions.take()
+        self._questions.forget()
         self._paused = transition.event == "paused"
         self.autonomy = autonomy_after(transition, self.autonomy)
         for name in self._ignored:

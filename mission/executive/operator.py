@@ -121,11 +121,10 @@ def _event(name: str, doing: str, cannot: str) -> Follow:
 
 
 def _step(executive: Executive, request: Mapping[str, Any], about: dict[str, Any]) -> tuple[bool, str]:
-    question = executive.status().waiting
-    if question is None:
+    if executive.question is None:
         return False, "nothing waits for an answer"
     yes = request.get("yes", True) is True
-    executive.note("confirm" if yes else "refuse", about["by"], at=about["at"], question=question)
+    executive.note("confirm" if yes else "refuse", about["by"], at=about["at"], question=executive.question.text)
     return True, executive.confirm(yes)
 
 

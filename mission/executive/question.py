@@ -63,6 +63,7 @@ class Questions:
         self._ask, self._answered = ask, answered
         self._tasks: set[asyncio.Task[None]] = set()
         self._waiting: tuple[Queued, Question] | None = None
+        self._refused: tuple[Queued, Question] | None = None
 
     @property
     def waiting(self) -> Question | None:
@@ -72,6 +73,7 @@ class Questions:
     def put(self, queued: Queued, question: Question) -> None:
         """Ask whether an event may be followed. A question that still waits is past."""
         waiting = self._waiting = (queued, question)
+        self._refused = None
         if self._ask is None:
             return
         ask = self._ask
@@ -85,13 +87,24 @@ class Questions:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def take(self) -> Queued | None:
-        """The event that waits for an answer; from now on it waits no more."""
-        waiting, self._waiting = self._waiting, None
-        return None if waiting is None else waiting[0]
+    @property
+    def open(self) -> Question | None:
+        """The question that waits, or else the one that was answered with no: that may still become a yes."""
+        asked = self._waiting or self._refused
+        return None if asked is None else asked[1]
+
+    def answer(self, yes: bool) -> Queued | None:
+        """The event that the open question is about; from now on it waits no more."""
+        asked = self._waiting or self._refused
+        self._waiting, self._refused = None, None if yes else asked
+        return None if asked is None else asked[0]
+
+    def forget(self) -> None:
+        """What was asked is past."""
+        self._waiting = self._refused = None
 
     def close(self) -> None:
         """Nobody needs to answer any more."""
-        self._waiting = None
+        self.forget()
         for task in self._tasks:
             task.cancel()

@@ -270,6 +270,21 @@ def test_a_key_answers_the_question_and_a_no_keeps_the_vehicle_holding(fly: Any)
     assert refused.walked == ["aborted"]
 
 
+def test_after_a_no_the_operator_may_still_say_yes(fly: Any) -> None:
+    shown: list[str] = []
+    flight = fly(
+        ASKING,
+        autonomy="confirm",
+        at=[
+            (3.0, lambda executive: executive.confirm(False)),
+            (4.0, lambda executive: shown.extend((executive.state, executive.status().text))),
+            (5.0, lambda executive: executive.raise_event("step", by="keyboard")),
+        ],
+    )
+    assert flight.run().outcome == "completed"
+    assert shown == ["one", "done was refused; `step` follows it after all"]
+
+
 def test_thinking_it_over_is_not_a_deadline_missed(fly: Any) -> None:
     states = {**ASKING, "one": {**ASKING["one"], "timeout_s": 10.0}}
     flight = fly(states, autonomy="confirm", at=[(60.0, lambda executive: executive.confirm(True))])
