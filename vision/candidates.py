@@ -29,6 +29,7 @@ Array = NDArray[Any]  # of floats
 CANDIDATES = 40
 LAST_SAMPLES = 84  # profiles along a line when it is measured for good
 LEAST_SUPPORT = 0.5
+LEAST_SEEN = 0.38  # the same of a line beyond which dots are missing and before which none are
 FOLLOWED_PX = 25.0  # of a step that a line follows, worth as much as one unit of what else speaks for it
 LEAST_RUN = 50.0  # px: a shorter stretch of an edge with no dots beside it is none
 
@@ -162,7 +163,8 @@ def _weighed(
         against = 2.0 * hidden + 3.0 * np.maximum(hidden - 0.5, 0.0) + (5.0 if blade.grid_known else 2.5) * empty
         return np.asarray(clear - against + 0.15 * np.minimum(beyond, 6))
 
-    value = np.where(support >= LEAST_SUPPORT, 2.0 * support + sums(before, empty, beyond), -np.inf)
+    least = np.where((beyond > 0) & (empty == 0), LEAST_SEEN, LEAST_SUPPORT)
+    value = np.where(support >= least, 2.0 * support + sums(before, empty, beyond), -np.inf)
     worth = sums(before_run, empty_run, beyond_run)
     return [
         Candidate(

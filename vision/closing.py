@@ -25,7 +25,7 @@ NARROWEST, WIDEST = np.deg2rad(20), np.deg2rad(84)  # angle of a spike
 OFF_AXIS = np.deg2rad(14)  # from a spike's middle to an edge of the blade, and to its dots
 AT_CORNER = 35.0  # px along the axis from where a spike's side meets an edge to where it ends
 PAST_PX = 60.0  # past its apex, over which a side of a spike must not go on
-LEAST_PARTNER = 0.0  # worth of an edge beside which no dots lie
+LEAST_PARTNER = -0.2  # worth of an edge beside which no dots lie
 LEAST_WORTH = -1.0  # of an edge behind a spike
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 

@@ -22,7 +22,7 @@ from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
 from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
 from vision.observation import Edge, Line
-from vision.unwitnessed import parts_unlike, witnessed
+from vision.unwitnessed import like_an_edge, typical_edge
 
 Array = NDArray[Any]  # of floats
 
@@ -60,7 +60,8 @@ def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: flo
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smooth, noise, other)
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
-    believed = [c for c in candidates if witnessed(c, blade.dots) or parts_unlike(c, blade, smooth)]
+    typical = typical_edge(candidates)
+    believed = [c for c in candidates if c.beyond > 0 or like_an_edge(c, tones, typical)]
     chosen = _choose([c for c in believed if not _hides_nothing(c, candidates, blade)], blade, largest)
     if len(chosen) == 1:
         chosen = with_partner(chosen[0], believed, blade, largest)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,7 +56,8 @@ def absent_dots(
     stereo: StereoPair,
 ) -> Array:
     """Where dots would lie in the left image (image frame, working px) if the blade went on, but are none; a spot that
-    nothing explains there leaves it open."""
+    nothing explains there leaves it open, and so does a place between dots of the blade, which bulges inward nowhere:
+    there one was overlooked."""
     points = expected_points(laser, surface.depth_m, surface.slope)
     free = np.isfinite(points[:, 0])
     free[blade.row * laser.columns + blade.column] = False
@@ -75,4 +77,13 @@ def absent_dots(
         unread = np.delete(spots.uv, known, axis=0)
         if len(unread):
             inside &= np.hypot(*(uv[:, None] - unread).transpose(2, 0, 1)).min(axis=1) > BORDER_PX
+    inside &= ~_enclosed(pixels[0], left.uv[blade.left])
     return np.asarray(pixels[0][inside] - stereo.left.centre, float)
+
+
+def _enclosed(points: Array, dots: Array) -> NDArray[np.bool_]:
+    """Which of the points (m, 2) lie inside the convex hull of dots (n, 2)."""
+    hull = cv2.convexHull(dots.astype(np.float32))[:, 0]
+    sides = np.roll(hull, -1, axis=0) - hull
+    turns = sides[:, 0] * (points[:, None, 1] - hull[:, 1]) - sides[:, 1] * (points[:, None, 0] - hull[:, 0])
+    return np.asarray((turns > 0).all(axis=1) | (turns < 0).all(axis=1))

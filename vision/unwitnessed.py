@@ -1,8 +1,11 @@
-"""Whether a step that no dots lie beside is an edge: the blade's own shade, seams and dirt make steps there too, and
-neither the dots nor the other eye can tell them from an edge. What is beyond an edge does not look like the blade."""
+"""Whether a step that no dots tell of is imaged as the blade's edges are. Where dots ought to lie beyond an edge and do
+not, the blade ends; where none could, its own seams and shadows, cables and the background make steps too. But both
+sides of an edge differ for good, unlike those of a seam or a cable, and it is as sharp as the camera draws it, unlike
+the rim of a shadow: it rises as quickly to its full height as the edges that dots do tell of."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,65 +13,78 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate
 from vision.capture import Image
-from vision.evidence import BEYOND_PX, Blade
 from vision.lines import sampled
 
 Array = NDArray[Any]  # of floats
 
-ACROSS = (5.0, 8.0, 12.0, 16.0)  # px beyond a step where its outside is looked at
-ALONG = 40  # places along it
-SPACING = (16.0, 44.0)  # px between neighbouring dots, midway between which the blade itself is seen
-ORDINARY = 0.05  # share of the blade that is brighter, and darker, than what it ordinarily shows
-LEAST_UNLIKE, TEXTURES = 0.5, 4.0  # of the step, and of the blade's own: so far out of its range the outside lies
+NEAR = 1.0  # px to each side, between which a step has risen in part
+FAR = (4.0, 6.0, 8.0)  # px to each side, between which it has risen in full
+PLACES = 6  # along an edge, of which at least so many have to be inside the image
+PASSES = 4  # of the robust fit
+APART, SIGMAS = 0.15, 2.5  # by how much the rises of two edges of a blade may differ, besides their standard deviations
+DRAWN = (0.35, 1.1)  # the rise of an edge as cameras draw it, where no other edge tells
 MOST_EMPTY = 0.15  # of the dots up to a step that may be missing, or the blade ends before it
-LEAST_TINT, SPREADS = 0.01, 3.0  # of another colour: log of the ratio of tones, and in spreads of the blade's own
-DARK = 4.0  # grey levels added before ratios are taken
-FEWEST = 5  # places that tell what the blade looks like
 
 
-def witnessed(edge: Candidate, dots: Array, reach: float = BEYOND_PX) -> bool:
-    """Whether dots lie beside the step, or are missing beyond it, near enough to tell that the blade ends there."""
-    if edge.beyond > 0:
-        return True
-    along = dots @ edge.profile.direction[edge.index]
-    beside = (along > edge.ends[0] - reach) & (along < edge.ends[1] + reach)
-    return bool((edge.rho - dots[beside] @ edge.outward < reach).any())
+@dataclass(frozen=True)
+class Rise:
+    """What share of a step's full height it rises within two pixels: 1 where it is perfectly sharp, less where it is
+    soft, more where both sides are alike farther off; its standard deviation; and how many of FAR tell it."""
+
+    share: float
+    sigma: float
+    reach: int
 
 
-def parts_unlike(edge: Candidate, blade: Blade, smooth: Image) -> bool:
-    """Whether what is beyond a step has another colour than the blade between its dots, or is brighter or darker than
-    the blade ordinarily is by far, and no dots are missing before it."""
-    centre = (np.array(smooth.shape[1::-1]) - 1) / 2
-    own = _tones(smooth, _between(blade.dots) + centre)
-    place = np.linspace(*edge.ends, ALONG)[:, None] * edge.profile.direction[edge.index]
-    outside = _tones(smooth, np.vstack([place + edge.outward * (edge.rho + off) for off in ACROSS]) + centre)
-    if len(own) < FEWEST or len(outside) < FEWEST or edge.empty > MOST_EMPTY:
+def rise_of(edge: Candidate, tones: Image, most: int = len(FAR)) -> Rise | None:
+    """How the step of an edge rises in tones (h, w, c), as far from it as the image and `most` of FAR go; None where
+    too little of it is in the image."""
+    profile, k = edge.profile, edge.index
+    t = profile.t[k]
+    use = profile.agrees[k] & (t >= edge.ends[0] - 1) & (t <= edge.ends[1] + 1)
+    t = t[use]
+    base = edge.rho + 0.5 * profile.bend[k] * (t - profile.focus[k]) ** 2
+    foot = t[:, None] * profile.direction[k] + base[:, None] * edge.outward
+    half = (np.array(tones.shape[1::-1]) - 1) / 2
+    for reach in range(most, 0, -1):
+        inside = (np.abs(foot) + FAR[reach - 1] * np.abs(edge.outward) < half).all(axis=1)
+        if inside.sum() >= PLACES:
+            return _fitted(foot[inside] + half, edge.outward, tones, reach)
+    return None
+
+
+def _fitted(places: Array, outward: Array, tones: Image, reach: int) -> Rise:
+    sides = np.array([*FAR[:reach], NEAR])
+    points = places + (np.r_[sides, -sides][:, None] * outward)[:, None]
+    values = sampled(tones, points[..., 0], points[..., 1]).astype(float)
+    change = values[: len(sides)] - values[len(sides) :]
+    full, part = change[:reach].mean(axis=0), change[reach]
+    channel = np.abs(full).argmax(axis=1)[:, None]
+    full, part = (np.take_along_axis(tone, channel, 1)[:, 0] for tone in (full, part))
+    weight = np.ones(len(full))
+    for _ in range(PASSES):
+        squares = float((weight * full**2).sum()) + 1e-6
+        share = float((weight * full * part).sum()) / squares
+        residual = part - share * full
+        scatter = 1.4826 * float(np.median(np.abs(residual))) + 1e-6
+        weight = 1 / (1 + (residual / (2 * scatter)) ** 2) ** 2
+    variance = float((weight * residual**2).sum() / weight.sum())
+    return Rise(share, float(np.sqrt(4 * variance / squares)), reach)
+
+
+def typical_edge(candidates: list[Candidate]) -> Candidate | None:
+    """The step that is the likeliest edge of the blade by the dots missing beyond it; None without one."""
+    told = [c for c in candidates if c.beyond > 0 and np.isfinite(c.value)]
+    return max(told, key=lambda c: c.value, default=None)
+
+
+def like_an_edge(edge: Candidate, tones: Image, typical: Candidate | None) -> bool:
+    """Whether a step rises as the typical edge of the blade does, and no dots are missing before it."""
+    rise = None if edge.empty > MOST_EMPTY else rise_of(edge, tones)
+    if rise is None:
         return False
-    low, high = np.quantile(own, [ORDINARY, 1 - ORDINARY], axis=0)
-    typical = np.median(outside, axis=0)
-    unlike = float(np.maximum(low - typical, typical - high).max())
-    if unlike > max(LEAST_UNLIKE * edge.step, TEXTURES * blade.texture):
-        return True
-    tint, theirs = _tint(own), _tint(outside)
-    apart = np.abs(np.median(theirs, axis=0) - np.median(tint, axis=0))
-    return bool((apart > LEAST_TINT + SPREADS * tint.std(axis=0)).any())
-
-
-def _between(dots: Array) -> Array:
-    """Points (n, 2) midway between neighbouring dots."""
-    apart = np.hypot(*(dots[:, None] - dots[None]).transpose(2, 0, 1))
-    first, second = np.nonzero(np.triu((apart > SPACING[0]) & (apart < SPACING[1]), 1))
-    return np.asarray((dots[first] + dots[second]) / 2)
-
-
-def _tones(smooth: Image, pixels: Array) -> Array:
-    """Tones (n, c) at those of some pixels that lie in the image."""
-    inside = ((pixels > 2) & (pixels < np.array(smooth.shape[1::-1]) - 3)).all(axis=1)
-    pixels = pixels[inside]
-    return sampled(smooth, pixels[None, :, 0], pixels[None, :, 1])[0] if len(pixels) else np.zeros((0, smooth.shape[2]))
-
-
-def _tint(tones: Array) -> Array:
-    """Logs (n, c) of tones over their mean: what shade leaves alone; zero without colour."""
-    logs = np.log(tones + DARK)
-    return np.asarray(logs - logs.mean(axis=1, keepdims=True))
+    usual = None if typical is None else rise_of(typical, tones, rise.reach)
+    if usual is None or usual.reach != rise.reach:
+        return DRAWN[0] - SIGMAS * rise.sigma < rise.share < DRAWN[1] + SIGMAS * rise.sigma
+    sigma = float(np.hypot(rise.sigma / rise.share, usual.sigma / usual.share))
+    return abs(float(np.log(max(rise.share, 1e-6) / usual.share))) < APART + SIGMAS * sigma
