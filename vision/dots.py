@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.motion import halved, motion_between
-from vision.peaks import Peaks, gained, standing_out
+from vision.motion import motion_between
+from vision.peaks import Peaks, Reach, gained, standing_out
+from vision.reduction import GREEN, half_green
 from vision.spot_fit import first_of_each, fit_spots
-from vision.spot_light import lights, weighed
+from vision.spot_light import lights
 
 Array = NDArray[Any]  # of floats
 
@@ -47,22 +48,25 @@ class Spots:
         return len(self.uv)
 
 
-def find_spots(off: Image | None, on: Image, reachable: Image | None = None, other: Spots | None = None) -> Spots:
-    """Spots of a laser-on image (h, w) uint8 of working size that its laser-off image, if there is one, does not have.
+def find_spots(
+    off: Image | None, on: Image, reach: Reach | None = None, other: Spots | None = None, small: Image | None = None
+) -> Spots:
+    """Spots of a laser-on image (h, w) or (h, w, 3) uint8 of working size that its laser-off image, if there is one,
+    does not have; of their green.
 
-    reachable (h, w): not zero where the laser's dots can be at all. other: the spots of the other eye, whose motion
-    and shape are the first guess here.
+    reach: where the laser's dots can be at all. other: the spots of the other eye, whose motion and shape are the first
+    guess here. small: `half_green` of the laser-on image, where it is known.
     """
-    small = halved(on)
+    small = half_green(on) if small is None else small
     motion = np.zeros(2)
-    if reachable is None:
-        reachable = np.full(on.shape, 255, np.uint8)
+    if reach is None:
+        reach = Reach.everywhere(small.shape)
     if off is None:
-        peaks = standing_out(small, reachable)
+        peaks = standing_out(small, reach)
     else:
-        small_off = halved(off)
+        small_off = half_green(off)
         motion = motion_between(small_off, small, None if other is None else other.motion)
-        peaks = gained(small_off, small, motion, reachable)
+        peaks = gained(small_off, small, motion, reach)
     shape = np.array(USUAL_SHAPE) if other is None else other.shape
     if len(peaks) == 0:
         return Spots(np.empty((0, 2)), np.empty(0), np.empty(0), motion, shape)
@@ -91,26 +95,19 @@ class _Lights:
 
 
 def _lights(on: Image, off: Image | None, peaks: Peaks, motion: Array, reach: int) -> _Lights:
-    side = 2 * reach + 1
-    signal, background, weights = (np.empty((len(peaks), side * side), np.float32) for _ in range(3))
+    size = (2 * reach + 1) ** 2
+    signal, weights = np.empty((2, len(peaks), size), np.float32)
     burnt = np.empty(signal.shape, np.bool_)
-    about = np.empty((len(peaks), 2), np.float32)
-    lights(
-        on, on if off is None else off, off is not None, peaks, motion, *_quadratic(reach), signal, background,
-        weights, burnt, about,
-    )  # fmt: skip
-    noise2 = max(float(np.median(about[:, 1])) / (1 if off is None else 2), LEAST_VARIANCE)
-    if off is None:
-        weights[:] = 1 / noise2
-    else:
-        weighed(signal, background, weights, about, noise2, REGISTRATION_PX)
-    middle = side * reach + reach
     start = np.zeros((len(peaks), 4))
-    start[:, 2] = np.maximum(
-        (signal[:, middle - 1] + signal[:, middle] + signal[:, middle + 1]) / 3,
-        np.where(burnt[:, middle], BURNT_LEVEL, 1.0),
-    )
+    lights(
+        _channels(on), _channels(on if off is None else off), GREEN if on.ndim == 3 else 0, off is not None, peaks,
+        motion, *_quadratic(reach), (LEAST_VARIANCE, REGISTRATION_PX, BURNT_LEVEL), signal, weights, burnt, start,
+    )  # fmt: skip
     return _Lights(signal, weights, burnt, start)
+
+
+def _channels(image: Image) -> Image:
+    return image[:, :, None] if image.ndim == 2 else image
 
 
 def _measured(on: Image, off: Image | None, peaks: Peaks, motion: Array, shape: Array) -> Spots:

@@ -20,7 +20,7 @@ from vision.closing import evidence_of, find_closed, goes_on, opposite, unexplai
 from vision.edge_fit import settled, trimmed
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
-from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
+from vision.lines import edge_pixels, hough_lines, sensor_noise
 from vision.observation import Edge, Line
 from vision.unwitnessed import like_an_edge, typical_edge
 
@@ -48,13 +48,14 @@ class Found:
     reasons: tuple[str, ...]
 
 
-def find_edges(tones: Image, blade: Blade, other: OtherEye | None, expected: float | None = None) -> Found:
-    """The blade's edges, axis and end. tones (h, w, c): working image, free of dots. expected: direction of the axis in
-    the image (rad, modulo π) where it is known beforehand; lines that run otherwise are then none of the blade's
-    edges."""
+def find_edges(
+    tones: Image, smooth: Image, blade: Blade, other: OtherEye | None, expected: float | None = None
+) -> Found:
+    """The blade's edges, axis and end. tones (h, w, c): working image, free of dots; smooth: the same `smoothed`.
+    expected: direction of the axis in the image (rad, modulo π) where it is known beforehand; lines that run otherwise
+    are then none of the blade's edges."""
     height, width = tones.shape[:2]
     noise = sensor_noise(tones)
-    smooth = smoothed(tones)
     lines, _ = hough_lines(edge_pixels(tones, noise), 220, (width, height))
     if expected is not None:
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]

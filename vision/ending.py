@@ -14,8 +14,8 @@ from vision.candidates import Candidate
 from vision.capture import Image
 from vision.ending_kernels import fittest, likeliest, summits_over
 from vision.evidence import Blade
+from vision.lane_kernels import seen_in_lanes, steps_in_lanes
 from vision.lines import visible_stretch
-from vision.profile_kernels import seen_in_lanes, steps_in_lanes
 
 Array = NDArray[Any]  # of floats
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vision.camera import StereoPair
 from vision.capture import Image
 from vision.evidence_kernels import line_of_most, longest_runs, median_steps, missing_dots, runs_about
+from vision.lane_kernels import steps_before
 from vision.lines import Profiles, steps_along
-from vision.profile_kernels import steps_before
 from vision.surface import Surface
 
 Array = NDArray[Any]  # of floats

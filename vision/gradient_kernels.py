@@ -11,8 +11,10 @@ from vision.capture import Image
 from vision.compiled import compiled
 
 Floats = NDArray[Any]
+Integers = NDArray[Any]
 
-LEVELS, PER_LEVEL = 4096, 8  # bins in which strengths are counted, and bins per grey level
+SUM = 36  # what a gradient is written as, in grey levels per px of the half-size image
+LEVEL, LEVELS = 9, 5441  # strengths that are counted as one, and how many such there are
 
 
 @compiled
@@ -37,35 +39,53 @@ def median_roughness(tones: Image) -> float:
 
 
 @compiled
-def gradients(tones: Image, dx: Floats, dy: Floats, strength: Floats) -> None:
+def gradients(tones: Image, dx: Integers, dy: Integers, strength: Integers) -> None:
     """Sobel gradients of the tone that changes most, in the half-size image of tones (h, w, c) after a 3 × 3 mean.
 
-    Written: dx, dy and strength = ½ (|dx| + |dy|), each (h // 2, w // 2) float32; zero in the outermost two pixels.
+    Written: dx, dy (h // 2, w // 2) int16, in grey levels per px times SUM, and strength = |dx| + |dy| uint16; zero in
+    the outermost two pixels. Nothing is rounded: sixteen bits hold the sums.
     """
-    height, width, channels = strength.shape[0], strength.shape[1], tones.shape[2]
-    half = np.empty((height, width), np.float32)
-    even, odd = np.empty(width, np.float32), np.empty(width, np.float32)
-    ninth, quarter, middle = np.float32(1 / 9), np.float32(0.25), np.float32(0.5)
-    three, four = np.float32(3), np.float32(4)
-    dx[:], dy[:], strength[:] = np.float32(0), np.float32(0), np.float32(0)
+    height, width = strength.shape
+    channels, step = tones.shape[2], tones.shape[1] * tones.shape[2]
+    flat = tones.reshape(-1)
+    half = np.empty((8, width), np.int16)  # of the last rows, sums of 2 × 2 pixels
+    even, odd = np.empty(width, np.int16), np.empty(width, np.int16)
+    dx[:2], dy[:2], strength[:2], dx[-2:], dy[-2:], strength[-2:] = 0, 0, 0, 0, 0, 0
+    dx[:, :2], dy[:, :2], strength[:, :2], dx[:, -2:], dy[:, -2:], strength[:, -2:] = 0, 0, 0, 0, 0, 0
     for c in range(channels):
         for y in range(height):
-            top, bottom, mean = tones[2 * y], tones[2 * y + 1], half[y]
+            top, bottom, sums = flat[2 * y * step + c :], flat[(2 * y + 1) * step + c :], half[y & 7]
+            if channels == 2:  # two loops, so that each has a stride that is known
+                for x in range(width):
+                    left = np.int16(top[4 * x]) + np.int16(bottom[4 * x])
+                    sums[x] = np.int16(left + np.int16(top[4 * x + 2]) + np.int16(bottom[4 * x + 2]))
+            else:
+                for x in range(width):
+                    at = 2 * channels * x
+                    left = np.int16(top[at]) + np.int16(bottom[at])
+                    sums[x] = np.int16(left + np.int16(top[at + channels]) + np.int16(bottom[at + channels]))
+            if y < 4:
+                continue
+            first, above, here, below = half[(y - 4) & 7], half[(y - 3) & 7], half[(y - 2) & 7], half[(y - 1) & 7]
             for x in range(width):
-                left = np.int32(top[2 * x, c]) + np.int32(bottom[2 * x, c])
-                mean[x] = quarter * np.float32(left + np.int32(top[2 * x + 1, c]) + np.int32(bottom[2 * x + 1, c]))
-        for y in range(2, height - 2):
-            first, above, here, below, last = half[y - 2], half[y - 1], half[y], half[y + 1], half[y + 2]
+                even[x] = np.int16(first[x] + sums[x] + 3 * (above[x] + below[x]) + 4 * here[x])
             for x in range(width):
-                even[x] = ninth * (first[x] + last[x] + three * (above[x] + below[x]) + four * here[x])
-                odd[x] = ninth * (last[x] + below[x] - above[x] - first[x])
+                odd[x] = np.int16(sums[x] + below[x] - above[x] - first[x])
             e0, e1, e3, e4 = even[:-4], even[1:], even[3:], even[4:]
             o0, o1, o2, o3, o4 = odd[:-4], odd[1:], odd[2:], odd[3:], odd[4:]
-            row_dx, row_dy, row = dx[y, 2:], dy[y, 2:], strength[y, 2:]
+            row_dx, row_dy, row = dx[y - 2, 2:], dy[y - 2, 2:], strength[y - 2, 2:]
+            if c == 0:
+                for x in range(width - 4):
+                    row_dx[x] = np.int16(e4[x] + e3[x] - e1[x] - e0[x])
+                for x in range(width - 4):
+                    row_dy[x] = np.int16(o0[x] + o4[x] + 3 * (o1[x] + o3[x]) + 4 * o2[x])
+                for x in range(width - 4):
+                    row[x] = np.uint16(abs(np.int32(row_dx[x])) + abs(np.int32(row_dy[x])))
+                continue
             for x in range(width - 4):
-                across = e4[x] + e3[x] - e1[x] - e0[x]
-                down = o0[x] + o4[x] + three * (o1[x] + o3[x]) + four * o2[x]
-                size = middle * (abs(across) + abs(down))
+                across = np.int16(e4[x] + e3[x] - e1[x] - e0[x])
+                down = np.int16(o0[x] + o4[x] + 3 * (o1[x] + o3[x]) + 4 * o2[x])
+                size = np.uint16(abs(np.int32(across)) + abs(np.int32(down)))
                 stronger = size > row[x]
                 row_dx[x] = across if stronger else row_dx[x]
                 row_dy[x] = down if stronger else row_dy[x]
@@ -73,11 +93,11 @@ def gradients(tones: Image, dx: Floats, dy: Floats, strength: Floats) -> None:
 
 
 @compiled
-def ridge(dx: Floats, dy: Floats, strength: Floats, least: float, most: int) -> tuple[Floats, float]:
+def ridge(dx: Integers, dy: Integers, strength: Integers, least: int, most: int) -> tuple[Floats, int]:
     """(u, v, dx, dy) (4, n) of the pixels that are stronger than `least` and than their neighbours across the step, and
     the strength they all reach: about the `most` strongest of them."""
     height, width = strength.shape
-    at_least = np.float32(least)
+    at_least = np.int32(least)
     is_ridge = np.empty(width, np.uint8)
     places = np.empty(strength.size + width, np.int32)
     count = 0
@@ -85,9 +105,9 @@ def ridge(dx: Floats, dy: Floats, strength: Floats, least: float, most: int) -> 
         row_dx, row_dy, row = dx[y, 1:], dy[y, 1:], strength[y, 1:]
         above, below, before, after = strength[y - 1, 1:], strength[y + 1, 1:], strength[y], strength[y, 2:]
         for x in range(width - 2):
-            upright = abs(row_dx[x]) >= abs(row_dy[x])
+            upright = abs(np.int32(row_dx[x])) >= abs(np.int32(row_dy[x]))
             beside = max(before[x], after[x]) if upright else max(above[x], below[x])
-            is_ridge[x] = (row[x] > at_least) & (row[x] >= beside)
+            is_ridge[x] = (np.int32(row[x]) > at_least) & (row[x] >= beside)
         for x in range(width - 2):
             places[count] = y * width + x + 1
             count += is_ridge[x]
@@ -95,12 +115,12 @@ def ridge(dx: Floats, dy: Floats, strength: Floats, least: float, most: int) -> 
     if count > most:
         counts = np.zeros(LEVELS, np.int64)
         for k in range(count):
-            counts[min(int(flat[places[k]] * PER_LEVEL), LEVELS - 1)] += 1
+            counts[flat[places[k]] // LEVEL] += 1
         level, reached = LEVELS, 0
         while level > 0 and reached < most:
             level -= 1
             reached += counts[level]
-        at_least = max(at_least, np.float32(level / PER_LEVEL))
+        at_least = max(at_least, np.int32(LEVEL * level))
         kept = 0
         for k in range(count):
             places[kept] = places[k]
@@ -111,7 +131,7 @@ def ridge(dx: Floats, dy: Floats, strength: Floats, least: float, most: int) -> 
     for k in range(count):
         at = places[k]
         found[0, k], found[1, k], found[2, k], found[3, k] = at % width, at // width, flat_dx[at], flat_dy[at]
-    return found, float(at_least)
+    return found, int(at_least)
 
 
 @compiled

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.gradient_kernels import gradients, line_votes, median_roughness, ridge
-from vision.profile_kernels import refine, steps_in_rows, stretches
+from vision.gradient_kernels import SUM, gradients, line_votes, median_roughness, ridge
+from vision.lane_kernels import steps_in_rows
+from vision.profile_kernels import refine, stretches
+from vision.workspace import lent
 
 Array = NDArray[Any]  # of floats
 
@@ -44,19 +46,21 @@ class Gradients:
 
 def edge_pixels(tones: Image, noise: float) -> Gradients:
     """Pixels whose brightness changes by more than noise, where it changes most."""
-    height, width = tones.shape[0] // 2, tones.shape[1] // 2
-    dx, dy, strength = np.empty((3, height, width), np.float32)
-    gradients(tones, dx, dy, strength)
-    (u, v, gx, gy), threshold = ridge(dx, dy, strength, max(2.0, 1.4 * noise), MOST_PIXELS)
-    weight = np.minimum(np.hypot(gx, gy) / np.float32(10 * threshold), np.float32(1))
+    size = (tones.shape[0] // 2, tones.shape[1] // 2)
+    dx, dy = lent("dx", size, np.int16), lent("dy", size, np.int16)
+    strength = lent("strength", size, np.uint16)
+    gradients(np.ascontiguousarray(tones), dx, dy, strength)
+    least = round(2 * SUM * max(2.0, 1.4 * noise))
+    (u, v, gx, gy), threshold = ridge(dx, dy, strength, least, MOST_PIXELS)
+    weight = np.minimum(np.hypot(gx, gy) / np.float32(5 * threshold), np.float32(1))
     centre = (np.array(tones.shape[1::-1]) - 1) / 2
     position = np.stack([u, v], axis=1) * 2.0 + (0.5 - centre)
     return Gradients(position, np.arctan2(gy, gx), weight)
 
 
-def smoothed(tones: Image) -> Image:
-    """A 3 × 3 mean of tones (h, w, c), of the same shape."""
-    return np.asarray(cv2.blur(tones, (3, 3)), np.uint8).reshape(tones.shape)
+def smoothed(tones: Image, room: Image | None = None) -> Image:
+    """A 3 × 3 mean of tones (h, w, c), of the same shape; room: where to write it."""
+    return np.asarray(cv2.blur(tones, (3, 3), room), np.uint8).reshape(tones.shape)
 
 
 def sampled(image: Image, u: Array, v: Array) -> NDArray[np.float32]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -20,13 +19,15 @@ from vision.grid import Matches, match_eyes, match_laser, nearest_surface, reach
 from vision.lines import smoothed
 from vision.mosaic import demosaiced
 from vision.observation import BladeObservation, Dots
+from vision.peaks import Reach
 from vision.quality import exposure, sharpness
-from vision.reduction import green, green_and_tones, reduce_image, reduction_factor, to_full
+from vision.reduction import half_green_and_tones, reduce_image, reduction_factor, to_full
 from vision.single import observe_photograph
 from vision.spot_paint import without_spots
 from vision.stopwatch import Now, Stopwatch
 from vision.surface import Surface, fit_surface
 from vision.tip import tip_of
+from vision.workspace import lent
 
 Array = NDArray[np.float64]
 
@@ -47,12 +48,12 @@ class Eye:
         self._now = now
         self.factor = reduction_factor(geometry.stereo.left.width)
         self._stereo = geometry.stereo.shrunk(self.factor)
-        self._reachable: tuple[Image, Image] | tuple[None, None] = (None, None)
+        self._reach: tuple[Reach, Reach] | tuple[None, None] = (None, None)
         if geometry.laser is not None:
             stereo = self._stereo
-            self._reachable = (
-                reachable(geometry.laser, stereo.left, np.eye(3), np.zeros(3)),
-                reachable(geometry.laser, stereo.right, stereo.rotation, stereo.translation),
+            self._reach = (
+                Reach.of(reachable(geometry.laser, stereo.left, np.eye(3), np.zeros(3))),
+                Reach.of(reachable(geometry.laser, stereo.right, stereo.rotation, stereo.translation)),
             )
 
     def observe(self, frames: StereoFrames, expected: float | None = None) -> BladeObservation:
@@ -70,13 +71,14 @@ class Eye:
                 self._check_size(name, image)
                 images[name] = reduce_image(image, self.factor, self.geometry.bayer)
         watch.lap("reduce")
-        # of the laser-on images, from here on, what is not green
-        lit, images["left_laser"] = green_and_tones(images["left_laser"])
-        left = find_spots(_green_of(images, "left"), lit, self._reachable[0])
+        small, tones = half_green_and_tones(images["left_laser"], "tones of left")
+        left = find_spots(images.get("left"), images["left_laser"], self._reach[0], small=small)
+        images["left_laser"] = tones
         right = None
         if "right_laser" in images:
-            lit, images["right_laser"] = green_and_tones(images["right_laser"])
-            right = find_spots(_green_of(images, "right"), lit, self._reachable[1], left)
+            small, tones = half_green_and_tones(images["right_laser"], "tones of right")
+            right = find_spots(images.get("right"), images["right_laser"], self._reach[1], left, small)
+            images["right_laser"] = tones
         watch.lap("dots")
         laser = self.geometry.laser
         if laser is None:
@@ -126,7 +128,7 @@ class Eye:
         factor, camera, laser = self.factor, self._stereo.left, self.geometry.laser
         assert laser is not None
         clean = without_spots(images["left_laser"], images.get("left"), left)
-        smooth = smoothed(clean)
+        smooth = smoothed(clean, lent("smooth left", clean.shape, np.uint8))
         seeds = left.uv[blade.left]
         dots = seeds - camera.centre
         around = Blade(
@@ -138,8 +140,10 @@ class Eye:
         )
         other = None
         if right is not None:
-            other = OtherEye(smoothed(images["right_laser"]), self._stereo, surface)
-        found = find_edges(clean, around, other, expected)
+            behind = images["right_laser"]
+            room = lent("smooth right", behind.shape, np.uint8)
+            other = OtherEye(smoothed(behind, room), self._stereo, surface)
+        found = find_edges(clean, smooth, around, other, expected)
         watch.lap("edges")
         edges = found.edges
         axis, reasons = found.axis, found.reasons
@@ -213,10 +217,6 @@ def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now |
         if geometry.bayer is not None and image.ndim == 2:
             image = demosaiced(image, geometry.bayer)
     return observe_photograph(image, now=now)
-
-
-def _green_of(images: Mapping[str, Image], name: str) -> Image | None:
-    return green(images[name]) if name in images else None
 
 
 def _without(matches: Matches, others: Matches) -> Matches:

@@ -1,4 +1,4 @@
-"""Inner loops that sample an image along lines: steps along rows of places, profiles across lines and along lanes."""
+"""Inner loops that fit lines to an image: the steepest steps on profiles across each, and the curve most lie on."""
 
 from __future__ import annotations
 
@@ -23,15 +23,25 @@ AGREES_PX = 1.5  # from the curve, at which a step is no part of the line
 
 
 @compiled
-def _tone(image: Image, u: float, v: float, channel: int) -> Any:
-    """Bilinear value of an image (h, w, c) at a pixel; the border continues outward."""
-    last_u, last_v = image.shape[1] - 1, image.shape[0] - 1
-    u, v = min(max(u, 0.0), last_u), min(max(v, 0.0), last_v)
-    x, y = min(int(u), last_u - 1), min(int(v), last_v - 1)
-    du, dv = u - x, v - y
-    above = image[y, x, channel] * (1.0 - du) + image[y, x + 1, channel] * du
-    below = image[y + 1, x, channel] * (1.0 - du) + image[y + 1, x + 1, channel] * du
-    return above * (1.0 - dv) + below * dv
+def _sampled(
+    image: Floats, height: int, width: int, channels: int, count: int, room: Floats, at: NDArray[np.int64], tone: Floats
+) -> None:
+    """Bilinear values, written to tone (c, count), of an image (h, w, c), flat, at pixels u, v in room (2, count); the
+    border continues outward. What is in room is lost, and at (count,) is to reckon in: row beside row, for vectors."""
+    across, down, below = room[0], room[1], width * channels
+    last_u, last_v = width - 1.0, height - 1.0
+    for i in range(count):
+        u, v = min(max(across[i], 0.0), last_u), min(max(down[i], 0.0), last_v)
+        left, top = min(np.floor(u), last_u - 1.0), min(np.floor(v), last_v - 1.0)
+        across[i], down[i] = u - left, v - top
+        at[i] = int(top * width + left) * channels
+    for c in range(channels):
+        values = tone[c]
+        for i in range(count):
+            k = at[i] + c
+            over = image[k] * (1.0 - across[i]) + image[k + channels] * across[i]
+            under = image[k + below] * (1.0 - across[i]) + image[k + below + channels] * across[i]
+            values[i] = over * (1.0 - down[i]) + under * down[i]
 
 
 @compiled
@@ -104,9 +114,10 @@ def refine(
     the steps makes of offset's and slope's, and the steps' variance.
     """
     lines, samples = t.shape
-    channels = smooth.shape[2]
-    wide = 2 * reach + 1
-    centre_u, centre_v = (smooth.shape[1] - 1) / 2, (smooth.shape[0] - 1) / 2
+    height, width, channels = smooth.shape
+    flat, wide = smooth.reshape(-1), 2 * reach + 1
+    room, corner = np.empty((2, wide + 2)), np.empty(wide + 2, np.int64)
+    centre_u, centre_v = (width - 1) / 2, (height - 1) / 2
     tone = np.empty((channels, wide + 2))
     raw, size = np.empty((samples, wide)), np.empty(wide)
     place, near, vote = np.empty(samples), np.empty(samples), np.empty(samples)
@@ -120,8 +131,8 @@ def refine(
             u, v = rho * nx - at * ny + centre_u, rho * ny + at * nx + centre_v
             for i in range(wide + 2):
                 across = i - reach - 1
-                for c in range(channels):
-                    tone[c, i] = _tone(smooth, u + across * nx, v + across * ny, c)
+                room[0, i], room[1, i] = u + across * nx, v + across * ny
+            _sampled(flat, height, width, channels, wide + 2, room, corner, tone)
             for i in range(wide):
                 change = tone[0, i + 2] - tone[0, i]
                 for c in range(1, channels):
@@ -181,129 +192,3 @@ def refine(
         spread[line, 0] = _solved(info, 1.0, 0.0, 0.0)[0]
         spread[line, 1] = _solved(info, 0.0, 1.0, 0.0)[1]
         spread[line, 2] = scatter / max(used, 1.0)
-
-
-@compiled
-def steps_in_rows(image: Image, u: Floats, v: Floats, change: Floats) -> None:
-    """Central differences, written to change (rows, n - 2), along rows of pixels u, v (rows, n): of the tone of the
-    image (h, w, c) that changes most."""
-    rows, count = u.shape
-    channels = image.shape[2]
-    tone = np.empty((channels, count))
-    for row in range(rows):
-        for i in range(count):
-            for c in range(channels):
-                tone[c, i] = _tone(image, u[row, i], v[row, i], c)
-        for i in range(count - 2):
-            most = tone[0, i + 2] - tone[0, i]
-            for c in range(1, channels):
-                other = tone[c, i + 2] - tone[c, i]
-                if abs(other) > abs(most):
-                    most = other
-            change[row, i] = most
-
-
-@compiled
-def steps_in_lanes(
-    image: Image, low: Floats, high: Floats, toward: Floats, skew_px: float, shares: Floats, stations: Floats,
-    quiet: Floats, boxes: tuple[int, int], shares_of_step: tuple[float, float], least: float, size: Floats,
-) -> None:  # fmt: skip
-    """Steps along lanes between two sides of a blade, zero where they are none, are a streak's or outside the image.
-
-    low, high (2,): offset across the direction `toward` (2,) and its change per px along it. shares (lanes,) from the
-    low side to the high one, stations (m,) px along, evenly; a lane is skew_px farther along at share 1 than at 0.
-    quiet (lanes,): station before which a lane has no step. boxes: samples averaged on each side of a step, and to
-    tell it from a streak: there it has to reach these shares of itself and of `least`. Written: size (lanes, m).
-    """
-    lanes, count = size.shape
-    height, width, channels = image.shape
-    short, long = boxes
-    centre_u, centre_v = (width - 1) / 2, (height - 1) / 2
-    sums = np.empty((channels, count + 2 * long + 1))
-    outside = np.empty(count, np.bool_)
-    for lane in range(lanes):
-        share = shares[lane]
-        offset = low[0] + share * (high[0] - low[0])
-        slope = low[1] + share * (high[1] - low[1])
-        ahead = skew_px * (share - 0.5)
-        first = 0
-        while first < count and stations[first] < quiet[lane]:
-            size[lane, first] = 0.0
-            first += 1
-        sums[:, first] = 0.0
-        for i in range(first, count + 2 * long):
-            m = min(max(i - long, 0), count - 1)
-            across, along = offset + slope * stations[m], stations[m] + ahead
-            u = along * toward[0] - across * toward[1] + centre_u
-            v = along * toward[1] + across * toward[0] + centre_v
-            outside[m] = u < 1 or v < 1 or u > width - 2 or v > height - 2
-            for c in range(channels):
-                sums[c, i + 1] = sums[c, i] + _tone(image, u, v, c)
-        for m in range(first, count):
-            size[lane, m] = 0.0
-            if outside[m]:
-                continue
-            here = m + long
-            brief, lasting = 0.0, 0.0
-            for c in range(channels):
-                middle = 2 * sums[c, here]
-                brief = max(brief, abs(sums[c, here + short] + sums[c, here - short] - middle))
-                lasting = max(lasting, abs(sums[c, here + long] + sums[c, here - long] - middle))
-            brief, lasting = brief / short, lasting / long
-            if lasting > shares_of_step[0] * brief and lasting > shares_of_step[1] * least:
-                size[lane, m] = brief
-
-
-@compiled
-def seen_in_lanes(size: Floats, least: float, back: int, slack: int, seen: Floats) -> None:
-    """How much of a step there is at each place of each lane, 0 to 1, or `slack` places beside it; less where a clearly
-    stronger one lies `back` places or more before it. size, seen (lanes, m)."""
-    lanes, count = size.shape
-    for lane in range(lanes):
-        strongest = 0.0
-        for m in range(count):
-            if m >= back:
-                strongest = max(strongest, size[lane, m - back])
-            value = min(max(size[lane, m] / least - 0.5, 0.0), 1.0)
-            if strongest > 1.3 * size[lane, m] and strongest > 1.5 * least:
-                value *= 0.3
-            seen[lane, m] = value
-        for _ in range(slack):
-            before = seen[lane, 0]
-            for m in range(1, count - 1):
-                here = seen[lane, m]
-                seen[lane, m] = max(here, 0.95 * max(before, seen[lane, m + 1]))
-                before = here
-
-
-@compiled
-def steps_before(
-    image: Image, normals: Floats, rhos: Floats, places: Floats, depths: Floats, first_px: float, step_px: float,
-    change: Floats,
-) -> None:  # fmt: skip
-    """Steps, written to change (k, m, n - 2), at n samples from first_px inward of each of k lines on, step_px apart,
-    at places (k, m) along it; zero farther in than depths (k,)."""
-    lines, count, inner = change.shape
-    channels = image.shape[2]
-    centre_u, centre_v = (image.shape[1] - 1) / 2, (image.shape[0] - 1) / 2
-    tone = np.empty((channels, inner + 2))
-    for line in range(lines):
-        nx, ny = normals[line, 0], normals[line, 1]
-        used = 0
-        while used < inner and first_px + step_px * (used + 1) < depths[line]:
-            used += 1
-        for m in range(count):
-            change[line, m] = 0.0
-            if used == 0:
-                continue
-            u = rhos[line] * nx - places[line, m] * ny + centre_u
-            v = rhos[line] * ny + places[line, m] * nx + centre_v
-            for i in range(used + 2):
-                inward = first_px + step_px * i
-                for c in range(channels):
-                    tone[c, i] = _tone(image, u - inward * nx, v - inward * ny, c)
-            for i in range(used):
-                most = 0.0
-                for c in range(channels):
-                    most = max(most, abs(tone[c, i + 2] - tone[c, i]))
-                change[line, m, i] = most

@@ -12,9 +12,11 @@ from vision.camera import Bayer
 from vision.capture import Image
 from vision.compiled import compiled
 from vision.mosaic import reduce_mosaic
+from vision.workspace import lent
 
 Array = NDArray[Any]  # of floats
 WORKING_WIDTH = 620
+GREEN = 1  # channel
 
 
 def reduction_factor(width: int) -> int:
@@ -41,7 +43,7 @@ def reduce_image(image: Image, factor: int, bayer: Bayer | None = None) -> Image
 
 def green(image: Image) -> Image:
     """The channel (h, w) in which a green laser shows best; a grey image is its own."""
-    return image if image.ndim == 2 else np.asarray(cv2.extractChannel(image, 1), np.uint8)
+    return image if image.ndim == 2 else np.asarray(cv2.extractChannel(image, GREEN), np.uint8)
 
 
 def tones(image: Image) -> Image:
@@ -54,22 +56,55 @@ def tones(image: Image) -> Image:
     return both
 
 
-def green_and_tones(image: Image) -> tuple[Image, Image]:
-    """Both of an image in one go."""
-    if image.ndim == 2:
-        return image, image[:, :, None]
-    size = image.shape[:2]
-    middle, both = np.empty(size, np.uint8), np.empty((*size, 2), np.uint8)
-    _apart(np.ascontiguousarray(image).reshape(-1), middle.reshape(-1), both.reshape(-1))
-    return middle, both
+def half_green(image: Image) -> Image:
+    """The green of an image (h, w) or (h, w, 3), averaged over blocks of 2 × 2 pixels."""
+    if image.ndim == 2 or image.shape[0] % 2 or image.shape[1] % 2:
+        return np.asarray(cv2.resize(green(image), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+    half = np.empty((image.shape[0] // 2, image.shape[1] // 2), np.uint8)
+    _half_green(np.ascontiguousarray(image).reshape(-1), half)
+    return half
+
+
+def half_green_and_tones(image: Image, purpose: str) -> tuple[Image, Image]:
+    """Both of an image in one go; the tones of a colour image are lent for a purpose."""
+    if image.ndim == 2 or image.shape[0] % 2 or image.shape[1] % 2:
+        return half_green(image), tones(image)
+    height, width = image.shape[:2]
+    half, both = np.empty((height // 2, width // 2), np.uint8), lent(purpose, (height, width, 2), np.uint8)
+    _apart(np.ascontiguousarray(image).reshape(-1), both.reshape(-1), half)
+    return half, both
 
 
 @compiled
-def _apart(image: Image, middle: Image, both: Image) -> None:
-    for k in range(len(middle)):
-        both[2 * k] = image[3 * k]
-        middle[k] = image[3 * k + 1]
-        both[2 * k + 1] = image[3 * k + 2]
+def _half_green(image: Image, half: Image) -> None:
+    height, width = half.shape
+    sums = np.empty(width, np.uint16)
+    for v in range(height):
+        upper, lower = image[12 * v * width :], image[(12 * v + 6) * width :]
+        out = half[v]
+        for u in range(width):
+            sums[u] = np.uint16(upper[6 * u + 1]) + np.uint16(upper[6 * u + 4])
+        for u in range(width):
+            both = sums[u] + np.uint16(lower[6 * u + 1]) + np.uint16(lower[6 * u + 4])
+            out[u] = np.uint8((both + np.uint16(2)) >> np.uint16(2))
+
+
+@compiled
+def _apart(image: Image, both: Image, half: Image) -> None:
+    height, width = half.shape
+    lines = np.empty((2, 2 * width), np.uint8)
+    upper, lower = lines[0], lines[1]
+    for v in range(height):
+        for i in range(2):
+            row, tones, line = image[6 * (2 * v + i) * width :], both[4 * (2 * v + i) * width :], lines[i]
+            for u in range(2 * width):
+                tones[2 * u] = row[3 * u]
+                line[u] = row[3 * u + 1]
+                tones[2 * u + 1] = row[3 * u + 2]
+        out = half[v]
+        for u in range(width):
+            left, right = np.uint16(upper[2 * u]) + np.uint16(lower[2 * u]), np.uint16(upper[2 * u + 1])
+            out[u] = np.uint8((left + right + np.uint16(lower[2 * u + 1]) + np.uint16(2)) >> np.uint16(2))
 
 
 def to_full(pixels: Array, factor: int) -> Array:

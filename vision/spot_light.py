@@ -17,16 +17,55 @@ BURNT = 250  # grey level from which a pixel only says that there was at least a
 
 @compiled
 def lights(
-    on: Image, off: Image, subtracted: bool, peaks: NDArray[np.int64], motion: Floats, fit: Floats, basis: Floats,
-    signal: Floats, background: Floats, slope2: Floats, burnt: NDArray[np.bool_], variances: Floats,
+    on: Image, off: Image, channel: int, subtracted: bool, peaks: NDArray[np.int64], motion: Floats, fit: Floats,
+    basis: Floats, limits: tuple[float, float, float], signal: Floats, weights: Floats, burnt: NDArray[np.bool_],
+    start: Floats,
 ) -> None:  # fmt: skip
-    """What the laser-on image has more than the laser-off image in a square around each of n peaks (u, v).
+    """What the laser-on image (h, w, c) has more than the laser-off image in a square around each of n peaks (u, v), in
+    one channel.
 
-    fit (6, p) and basis (6, p): least squares of a quadratic surface on the p pixels of a square. Written: signal
-    (n, p) = on minus the raw laser-off image, background (n, p) = the laser-off image minus its quadratic surface,
-    slope2 (n, p) = its squared gradient, burnt (n, p), variances (n, 2): of the laser-off image about its surface,
-    and of the difference along the border. Without a laser-off image (not `subtracted`) a plane through the border of
-    the laser-on image stands for it."""
+    fit (6, p) and basis (6, p): least squares of a quadratic surface on the p pixels of a square. limits: least
+    variance of the noise, how far apart the images may lie in px, and the level of a spot whose middle is burnt out.
+    Written: signal (n, p) = on minus Wiener's estimate of the laser-off image, weights (n, p), its inverse variance,
+    burnt (n, p), and start (n, 4), of which the third is a first guess of the level. Without a laser-off image (not
+    `subtracted`) a plane through the border of the laser-on image stands for it."""
+    least_variance, registration_px, burnt_level = limits
+    background, variances = np.empty(signal.shape, np.float32), np.empty((len(signal), 2), np.float32)
+    _differences(on, off, channel, subtracted, peaks, motion, fit, basis, signal, background, weights, burnt, variances)
+    count, size = signal.shape
+    rough = variances[:, 1].copy()
+    noise2 = max(_median(rough) / (2 if subtracted else 1), least_variance)
+    if subtracted:
+        _weighed(signal, background, weights, variances, noise2, registration_px)
+    else:
+        weights[:] = np.float32(1 / noise2)
+    middle = size // 2
+    for n in range(count):
+        level = (signal[n, middle - 1] + signal[n, middle] + signal[n, middle + 1]) / np.float32(3)
+        start[n, 2] = max(level, burnt_level if burnt[n, middle] else 1.0)
+
+
+@compiled
+def _median(values: Floats) -> Any:
+    """Median of a few values; they are put in order."""
+    count = len(values)
+    for k in range(1, count):
+        value, place = values[k], k
+        while place > 0 and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
+    return (values[(count - 1) // 2] + values[count // 2]) / 2
+
+
+@compiled
+def _differences(
+    on: Image, off: Image, channel: int, subtracted: bool, peaks: NDArray[np.int64], motion: Floats, fit: Floats,
+    basis: Floats, signal: Floats, background: Floats, slope2: Floats, burnt: NDArray[np.bool_], variances: Floats,
+) -> None:  # fmt: skip
+    """As `lights`, but written are: signal (n, p) = on minus the raw laser-off image, background (n, p) = the laser-off
+    image minus its quadratic surface, slope2 (n, p) = its squared gradient, burnt (n, p), variances (n, 2): of the
+    laser-off image about its surface, and of the difference along the border."""
     count, size = signal.shape
     side = int(np.sqrt(size) + 0.5)
     reach = side // 2
@@ -40,14 +79,14 @@ def lights(
     for n in range(count):
         left, top = peaks[n, 0] - reach, peaks[n, 1] - reach
         for i in range(side):
-            _row(on, top + i, left, lit)
+            _row(on, channel, top + i, left, lit)
             row_signal, row_burnt = signal[n, i * side : (i + 1) * side], burnt[n, i * side : (i + 1) * side]
             for k in range(side):
                 row_signal[k] = lit[k]
                 row_burnt[k] = lit[k] >= BURNT
             if subtracted:
-                _row(off, top + i + shift_v, left + shift_u, upper)
-                _row(off, top + i + shift_v + 1, left + shift_u, lower)
+                _row(off, channel, top + i + shift_v, left + shift_u, upper)
+                _row(off, channel, top + i + shift_v + 1, left + shift_u, lower)
                 moved, upper_next, lower_next = still[i], upper[1:], lower[1:]
                 for k in range(side):
                     high = upper[k] + part_u * (upper_next[k] - upper[k])
@@ -87,28 +126,27 @@ def lights(
 
 
 @compiled
-def _row(image: Image, v: int, left: int, values: Floats) -> None:
-    """The pixels of a row from a column on; the border continues outward."""
-    height, width = image.shape
+def _row(image: Image, channel: int, v: int, left: int, values: Floats) -> None:
+    """The pixels of a row from a column on, of one channel; the border continues outward."""
+    height, width = image.shape[0], image.shape[1]
     row = image[min(max(v, 0), height - 1)]
     if left >= 0 and left + len(values) <= width:
-        inside = row[left : left + len(values)]
         for k in range(len(values)):
-            values[k] = inside[k]
+            values[k] = row[left + k, channel]
     else:
         for k in range(len(values)):
-            values[k] = row[min(max(left + k, 0), width - 1)]
+            values[k] = row[min(max(left + k, 0), width - 1), channel]
 
 
 @compiled
-def weighed(
+def _weighed(
     signal: Floats, background: Floats, weights: Floats, about: Floats, noise2: float, registration_px: float
 ) -> None:
     """Replace the raw laser-off image in signal (n, p) by Wiener's estimate of it, and the squared slopes in weights
     (n, p) by the inverse variance of the signal.
 
     As much of the laser-off image's detail counts as exceeds its noise (Lee 1980), so that where the blade is plain
-    the noise of only one image does. about (n, 2): as `lights` writes it; noise2: variance of one image's noise."""
+    the noise of only one image does. about (n, 2): as `_differences` writes it; noise2: variance of one image."""
     for n in range(len(signal)):
         detail = max(about[n, 0] - noise2, 0.0)
         gain = detail / (detail + noise2)

@@ -12,6 +12,7 @@ from vision.compiled import compiled
 from vision.dots import Spots
 from vision.spot_light import BURNT
 from vision.surface_kernels import solve
+from vision.workspace import lent
 
 Array = NDArray[Any]  # of floats
 
@@ -20,8 +21,10 @@ REACH = 5  # px, half the square around a spot
 
 def without_spots(on: Image, off: Image | None, spots: Spots) -> Image:
     """A copy of the laser-on image's tones (h, w, c) without its spots: painted over from the laser-off image or its
-    tones, moved as `spots.motion` says; without one, each spot as fitted to its surroundings is taken away."""
-    clean = np.array(on, order="C")
+    tones, moved as `spots.motion` says; without one, each spot as fitted to its surroundings is taken away. It is lent
+    for one look."""
+    clean = lent("clean", on.shape, np.uint8)
+    np.copyto(clean, on)
     if len(spots) == 0:
         return clean
     if off is not None:
