@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from mission.language.codes import CODES, Level
 from mission.language.location import Location
 
 _LONGEST = 600
+_JOINED = re.compile(r"(?P<key>\w+)(\s*[:=]\s*|\s+)(?P<value>\S.*)")
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,12 @@ def printable(text: str) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """`did you mean …?`, or an empty string where nothing is near."""
+    """`did you mean …?`, or an empty string where nothing is near. A key that swallowed its value is told apart."""
     names = sorted(set(known))
+    if (joined := _JOINED.fullmatch(name)) and joined["key"] in names:
+        return f"write {joined['key']}: {joined['value']}, with a colon and a space"
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    near = near or difflib.get_close_matches(name.lower(), names, n=1, cutoff=0.6)
     if not near and (tails := [other for other in names if other.rpartition(".")[2] == name]):
         near = tails[:1]
     return f"did you mean {near[0]}?" if near else ""

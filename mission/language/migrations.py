@@ -53,7 +53,7 @@ def _renamed(node: Node) -> Node:
         elif key == "with":
             entries[key] = entry
         else:
-            entries[_RENAMED_IN_1.get(key, key)] = Entry(entry.key, _renamed(inner))
+            entries[_RENAMED_IN_1.get(key, key)] = Entry(entry.key, _renamed(inner), entry.first)
     return Table(entries, node.location, node.size)
 
 

@@ -132,7 +132,7 @@ def _parameters(root: Table, problems: list[Diagnostic]) -> dict[str, Any]:
         problems.append(Diagnostic(node.location, "M203", f"parameters must map names to values, not {kind(node)}"))
         return {}
     for name, entry in node.entries.items():
-        if not name.isidentifier():
+        if not (name.isidentifier() and name.isascii()):
             problems.append(Diagnostic(entry.key, "M207", f"{name!r} cannot name a parameter", "letters, digits and _"))
     return dict(plain(node))
 

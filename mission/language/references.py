@@ -67,7 +67,7 @@ class _Resolver:
                 size = self.bounded(1 + sum(value.node.size for value in values.values()), parameters.location)
                 entries[key] = Entry(entry.key, Table(values if size else {}, parameters.location, size))
             else:
-                entries[key] = Entry(entry.key, self.inside(entry.node, inner))
+                entries[key] = Entry(entry.key, self.inside(entry.node, inner), entry.first)
         size = self.bounded(1 + sum(entry.node.size for entry in entries.values()), node.location)
         return Table(entries if size else {}, node.location, size)
 

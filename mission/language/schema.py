@@ -169,7 +169,7 @@ def _overlay(node: dict[str, Any]) -> dict[str, Any]:
 
 def _removable(value: dict[str, Any]) -> dict[str, Any]:
     """A value, a reference to one, or nothing; what is said about it stays outermost, where editors look."""
-    said = {key: value[key] for key in ("description", "default", "title", "examples") if key in value}
+    said: dict[str, Any] = {key: value[key] for key in ("description", "default", "title", "examples") if key in value}
     own = {key: inner for key, inner in value.items() if key not in said}
     if not own or own == {"type": "object"}:
         return value

@@ -1,10 +1,11 @@
-"""States and answers that are no mappings, found in each file by itself: composed they may be hidden."""
+"""States and answers that are not what they should be: no mappings, found in each file by itself as composed they may
+be hidden, and names that are nearly another's."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from mission.language.diagnostics import Diagnostic
+from mission.language.diagnostics import Diagnostic, suggestion
 from mission.language.tree import Items, Node, Scalar, Table, kind
 
 
@@ -37,3 +38,10 @@ def no_state(name: str, node: Node) -> Diagnostic:
 
 def _no_mapping(node: Node) -> bool:
     return not isinstance(node, Table) and not (isinstance(node, Scalar) and node.value is None)
+
+
+def mistaken_for(path: str, states: Iterable[str]) -> str:
+    """The state beside it whose name is so near that one of the two may be a typo."""
+    scope, _, name = path.rpartition(".")
+    beside = [other.rpartition(".") for other in states if other != path]
+    return suggestion(name, [last for outer, _, last in beside if outer == scope])

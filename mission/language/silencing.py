@@ -8,6 +8,8 @@ from mission.language.codes import CODES, Level
 from mission.language.diagnostics import Diagnostic, near_or_choices
 from mission.language.location import Location
 
+_UNREADABLE = ("M005", "M007", "M008", "M104", "M105")
+
 
 def any_error(findings: Sequence[Diagnostic]) -> bool:
     """Whether one of them keeps a mission from being flown."""
@@ -17,7 +19,9 @@ def any_error(findings: Sequence[Diagnostic]) -> bool:
 def silenced(
     problems: Sequence[Diagnostic], allowed: Mapping[str, Mapping[int, tuple[str, ...]]], checked: bool
 ) -> tuple[Diagnostic, ...]:
-    """Findings without those that `# allow: CODE` permits, with those about useless permissions; sorted, each once."""
+    """The findings, sorted, each once: without those that follow from others or that `# allow: CODE` permits, with those
+    about useless permissions."""
+    problems = _first_causes(problems)
     kept: list[Diagnostic] = []
     used: set[tuple[str, int, str]] = set()
     for finding in dict.fromkeys(problems):
@@ -41,3 +45,9 @@ def silenced(
                 elif line and (file, line, code) not in used and checked:
                     kept.append(Diagnostic(place, "M108", f"allow: nothing on this line raises {code}", "remove it"))
     return tuple(sorted(kept, key=lambda finding: (finding.location, finding.level is Level.WARNING, finding.code)))
+
+
+def _first_causes(problems: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """Without what is said of a value that could not even be read: it stands there as nothing."""
+    unread = {finding.location for finding in problems if finding.code in _UNREADABLE}
+    return [finding for finding in problems if finding.code != "M203" or finding.location not in unread]

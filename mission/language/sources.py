@@ -3,6 +3,7 @@ outside."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -53,7 +54,7 @@ class Sources:
             hint = f"files of a mission lie inside {shown(self.root)}"
             self.problems.append(Diagnostic(place, "M103", f"{name!r} leads outside the mission's folder", hint))
             return None
-        return folder / name
+        return _tidy(folder / name, path)
 
     def _read(self, path: Path, asked: Location | None, chain: tuple[Path, ...]) -> Table | None:
         file = shown(path)
@@ -83,7 +84,7 @@ class Sources:
         entries: dict[str, Entry] = {}
         for key, entry in node.entries.items():
             if key not in COMPOSING:
-                entries[key] = Entry(entry.key, self._inside(entry.node, folder, chain))
+                entries[key] = Entry(entry.key, self._inside(entry.node, folder, chain), entry.first)
         own = Table(entries, node.location, node.size)
         below: Table | None = None
         for key in COMPOSING:
@@ -161,6 +162,12 @@ def shown(path: Path) -> str:
         return str(tidy.relative_to(Path.cwd())) if tidy.is_relative_to(Path.cwd()) else str(path)
     except (OSError, ValueError):
         return printable(str(path))
+
+
+def _tidy(path: Path, real: Path) -> Path:
+    """The path without its detours (`a/../b`), where that is the same file; `a` may be a link to elsewhere."""
+    short = Path(os.path.normpath(path))
+    return short if short.resolve() == real else path
 
 
 def _real(path: Path) -> Path:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mission.behaviours.behaviour import Behaviour, NoParameters, Parameters
 from mission.language.diagnostics import Diagnostic, near_or_choices
 from mission.language.document import OUTCOMES, State, enclosing
 from mission.language.limits import Limits
 from mission.language.location import Location
-from mission.language.shapes import no_state
+from mission.language.shapes import mistaken_for, no_state
 from mission.language.transitions_in import TransitionReader, read_flag, read_number
 from mission.language.tree import Node, Scalar, Table, kind, merge
 from mission.language.typed import typed
@@ -80,7 +80,7 @@ class StatesReader:
         reached |= {target for _, target in ways}
         for path, state in states.items():
             if path not in reached and not state.entry:
-                self.report(state.location, "M301", f"nothing names the state {path!r}")
+                self.report(state.location, "M301", f"nothing names the state {path!r}", mistaken_for(path, self.found))
 
     def transition_reader(self) -> TransitionReader:
         """Reads transitions among the states that were found."""
@@ -125,9 +125,9 @@ class StatesReader:
             if len(self.found) >= _MOST_STATES:
                 self.report(entry.key, "M006", f"a mission may have {_MOST_STATES} states at most")
                 break
-            self.found[path] = _Found(path, parent, entry.node, entry.key, ())
-            if (inner := entry.node.get("states")) is not None:
-                self.found[path] = _Found(path, parent, entry.node, entry.key, self.collect(inner, path))
+            found = self.found[path] = _Found(path, parent, entry.node, entry.origin, ())
+            if (inner := found.table.get("states")) is not None:
+                self.found[path] = replace(found, children=self.collect(inner, path))
         return tuple(paths)
 
     def state(self, found: _Found, reader: TransitionReader) -> State:
@@ -135,9 +135,8 @@ class StatesReader:
         for key, entry in table.entries.items():
             if key not in FIELDS:
                 self.report(entry.key, "M202", f"a state has no {key!r}", near_or_choices(key, FIELDS))
-        final = self.final(found)
+        on, final = table.get("on"), self.final(found)
         self.one_kind(found, final)
-        on = table.get("on")
         return State(
             path=path,
             parent=found.parent,
@@ -173,7 +172,7 @@ class StatesReader:
         return str(value) if final else None
 
     def one_kind(self, found: _Found, final: str | None) -> None:
-        table = found.table
+        table, path = found.table, found.path
         if final is not None:
             for key in ("do", "with", "states", "initial", "on", "timeout_s"):
                 if key in table.entries:
@@ -189,7 +188,8 @@ class StatesReader:
         elif "initial" in table.entries:
             self.report(table.key_location("initial"), "M214", "initial belongs to a state with states inside")
         if final is None and "with" in table.entries and "do" not in table.entries and "states" not in table.entries:
-            self.report(found.place, "M214", f"the state {found.path!r} has parameters, but no `do` that takes them")
+            message = f"the state {path!r} has parameters, but no `do` that takes them"
+            self.report(found.place, "M214", message, mistaken_for(path, self.found))
 
     def do(self, table: Table) -> str | None:
         node = table.get("do")

@@ -38,10 +38,16 @@ class Items:
 
 @dataclass(frozen=True)
 class Entry:
-    """A key with its place, and what belongs to it."""
+    """A key with its place, and what belongs to it. first: where the key stands in the file that others only add to."""
 
     key: Location
     node: Node
+    first: Location | None = None
+
+    @property
+    def origin(self) -> Location:
+        """Where what belongs to the key was begun."""
+        return self.first or self.key
 
 
 @dataclass(frozen=True)
@@ -75,7 +81,8 @@ class Table:
     def replacing(self, key: str, node: Node, location: Location | None = None) -> Table:
         """The same with one value exchanged or added."""
         place = location or self.key_location(key)
-        return Table({**self.entries, key: Entry(place, node)}, self.location, self.size + node.size)
+        first = self.entries[key].first if key in self.entries else None
+        return Table({**self.entries, key: Entry(place, node, first)}, self.location, self.size + node.size)
 
     def without(self, *keys: str) -> Table:
         """The same without some keys."""
@@ -151,11 +158,26 @@ def merge(below: Table, above: Table) -> Table:
             del entries[key]
             continue
         elif isinstance(present.node, Table) and isinstance(entry.node, Table):
-            entries[key] = Entry(entry.key, merge(present.node, entry.node))
+            first = entry.key if _takes_over(present.node, entry.node) else present.origin
+            entries[key] = Entry(entry.key, merge(present.node, entry.node), first)
         else:
             entries[key] = entry
         before = key
     return Table(entries, above.location, 1 + sum(entry.node.size for entry in entries.values()))
+
+
+def _takes_over(below: Table, above: Table) -> bool:
+    """Whether `above` takes something away from `below`, or has it do something else: what is then missing is missing
+    because of it."""
+    if "do" in above.entries:
+        return True
+    for key, entry in above.entries.items():
+        present = below.get(key)
+        if isinstance(entry.node, Scalar) and entry.node.value is None and present is not None:
+            return True
+        if isinstance(entry.node, Table) and isinstance(present, Table) and _takes_over(present, entry.node):
+            return True
+    return False
 
 
 def _inserted(entries: dict[str, Entry], before: str | None, key: str, entry: Entry) -> dict[str, Entry]:

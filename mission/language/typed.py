@@ -59,8 +59,15 @@ def _finding(model: type[BaseModel], root: Table, place: Location, what: str, de
         _, location = descend(root, path)
         return Diagnostic(_culprit(node, message) or (place if not path else location), "M205", f"{label}: {message}")
     code = "M204" if any(word in kind_of_error for word in _OUTSIDE) else "M203"
-    given = f", not {kind(node)}" if code == "M203" else f", not {kind(node).removeprefix('the ')}"
+    given = f", not {kind(node)}" if code == "M203" else f", not {_value(node)}"
     return Diagnostic(location, code, f"{label}: {_lower(message)}{given}{used}", _meaning(model, path).strip(" ()"))
+
+
+def _value(node: Node) -> str:
+    """What is given, where its type is right."""
+    if isinstance(node, Scalar) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
+        return f"{node.value:g}"
+    return kind(node).removeprefix("the ").removeprefix("text ")
 
 
 def _culprit(node: Node, message: str) -> Location | None:

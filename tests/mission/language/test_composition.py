@@ -29,6 +29,60 @@ def test_nothing_removes_what_was_inherited(tmp_path: Path) -> None:
     assert "work" in findings[0].message
 
 
+@pytest.mark.parametrize(
+    ("below", "above", "file"),
+    [
+        ("timeout_s: 60, on: {done: home", "states: {work: {with: {for_s: 9}}}", "base.yaml"),
+        ("", "states: {work: {timeout_s: ~}}", "other.yaml"),
+        ("", "states: {work: {do: align_gimbal, with: ~}}", "other.yaml"),
+    ],
+)
+def test_what_a_state_lacks_is_reported_in_the_file_that_lets_it_lack_it(
+    tmp_path: Path, below: str, above: str, file: str
+) -> None:
+    base = written(tmp_path, SMALL.replace(below, below.removeprefix("timeout_s: 60, ")), "base.yaml")
+    path = written(tmp_path, f"extends: base.yaml\nmission: other\n{above}\n", "other.yaml")
+    finding = next(one for one in examine(path).errors if one.code in ("M303", "M306"))
+    line = line_of(base.read_text(), "work: {do") if file == "base.yaml" else 3
+    assert (Path(finding.location.file).name, finding.location.line) == (file, line), str(finding)
+
+
+def test_a_file_is_named_without_detours(tmp_path: Path) -> None:
+    missions = folder(tmp_path)
+    (missions / "farm").mkdir()
+    (missions / "base.yaml").write_text(
+        SMALL.replace("timeout_s: 60, on: {done: home", "timeout_s: soon, on: {done: home")
+    )
+    (missions / "farm" / "other.yaml").write_text("extends: ../base.yaml\nmission: other\n")
+    finding = only(examine(missions / "farm" / "other.yaml"))
+    assert Path(finding.location.file) == missions / "base.yaml"
+
+
+def test_a_value_that_cannot_be_read_is_reported_once(tmp_path: Path) -> None:
+    for value in ('"${gone}"', "*gone", "!!python/name:os.system x"):
+        only(examined(tmp_path, SMALL.replace("for_s: 5", f"for_s: {value}")))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "remedy"),
+    [
+        ("done: home,", "done:home,", "write done: home"),
+        ("done: home,", "done=home,", "write done: home"),
+        ("done: home,", "done home,", "write done: home"),
+        ("work: {do: hold", "work: {Do: hold", "did you mean do?"),
+    ],
+)
+def test_a_slip_of_the_pen_is_understood(tmp_path: Path, before: str, after: str, remedy: str) -> None:
+    assert any(remedy in finding.hint for finding in examined(tmp_path, SMALL.replace(before, after)).errors)
+
+
+def test_a_misspelt_state_of_the_file_below_is_told_by_its_neighbour(tmp_path: Path) -> None:
+    written(tmp_path, SMALL, "base.yaml")
+    text = "extends: base.yaml\nmission: other\nstates: {wrok: {with: {for_s: 9}}}\n"
+    findings = examine(written(tmp_path, text, "other.yaml")).errors
+    assert [(finding.code, finding.hint) for finding in findings] == [("M214", "did you mean work?")]
+
+
 def test_a_mistake_in_an_included_file_is_reported_there(tmp_path: Path) -> None:
     part = folder(tmp_path) / "parts" / "work.yaml"
     part.parent.mkdir()
