@@ -19,7 +19,7 @@ def any_error(findings: Sequence[Diagnostic]) -> bool:
 def silenced(
     problems: Sequence[Diagnostic], allowed: Mapping[str, Mapping[int, tuple[str, ...]]], checked: bool
 ) -> tuple[Diagnostic, ...]:
-    """The findings, sorted, each once: without those that follow from others or that `# allow: CODE` permits, with those
+    """The findings, sorted, each once: without what follows from others or what `# allow: CODE` permits, with those
     about useless permissions."""
     problems = _first_causes(problems)
     kept: list[Diagnostic] = []

@@ -32,7 +32,7 @@ MISTAKES = {
     "malformed YAML": (with_change("parameters:", "parameters: ["), "mission.yaml:"),
     "unknown key": (with_change("initial: preflight", "initail: preflight"), "initial"),
     "wrong type": (with_change("standoff_m: 3.0", "standoff_m: near"), "standoff_m"),
-    "missing target": (with_change("confirmed: reposition", "confirmed: repositoin"), "reposition"),
+    "missing target": (with_change("to: reposition", "to: repositoin"), "reposition"),
     "unknown behaviour": (with_change("do: take_off", "do: take_of"), "take_off"),
     "parameter out of range": (with_change("height_m: 15", "height_m: -15"), "height_m"),
     "missing include": (with_change("turbines/v80.yaml", "turbines/v90.yaml"), "v90.yaml"),
