@@ -15,16 +15,22 @@ def interrupted_run(resume: Path | None, logs: Path) -> RunFolder | None:
     """The folder that `--resume` names; None without it.
 
     Raises:
-        CommandError, RunFolderError: it is still being flown, or there is none.
+        CommandError, RunFolderError: it is still being flown, another run goes on with it already, or there is none.
     """
     if resume is None:
         return None
     from mission.executive.operator import flying
     from mission.record.folder import open_run
+    from mission.record.lineage import last_of_row
 
     folder = open_run(resume, logs)
     if folder.path.resolve() in [path.resolve() for path in flying(folder.path.parent)]:
         raise CommandError(f"run: {folder.name} is still flown: `mission status` shows it, `mission abort` ends it")
+    last = last_of_row(folder)
+    if last != folder:
+        raise CommandError(
+            f"run: {folder.name} was gone on with already: give --resume {last.name}, the last of its row"
+        )
     return folder
 
 

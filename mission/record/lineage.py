@@ -58,6 +58,22 @@ def lineage(folder: RunFolder) -> tuple[RunFolder, ...]:
     return tuple(found)
 
 
+def last_of_row(folder: RunFolder) -> RunFolder:
+    """The newest of the runs beside this one that go on with it and did anything; itself where none does."""
+    beside = folder.path.resolve().parent
+    after: dict[str, RunFolder] = {}
+    for path in sorted(beside.glob(f"*/{NOTE}")):
+        run = RunFolder(path.parent)
+        continues = note_of(run).continues
+        if continues is not None and not untouched(run):
+            after[(beside / continues).resolve().name] = run
+    seen, last = {folder.name}, folder
+    while (following := after.get(last.name)) is not None and following.name not in seen:
+        seen.add(following.name)
+        last = following
+    return last
+
+
 def untouched(folder: RunFolder) -> bool:
     """Whether a run was begun, and cut off before it could do anything: no setpoint was sent, nothing was found out,
     no picture was taken."""

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from mission.cli.errors import CommandError
+from mission.cli.going_on import interrupted_run
 from mission.cli.report import rebuild, told
 from mission.record.folder import RunFolder, create
 from mission.record.history import RunHistory
-from mission.record.lineage import NOTE, RunNote, lineage, note_of, reference
+from mission.record.lineage import NOTE, RunNote, last_of_row, lineage, note_of, reference
 from mission.record.summary import summarise
 from tests.mission.record.synthetic_run import MISSION, flown, fly, write_journal
 
@@ -70,6 +72,20 @@ def test_the_page_shows_photographs_of_every_run(runs: list[RunFolder]) -> None:
     page = runs[-1].report.read_text()
     assert f"../{runs[0].name}/frames/" in page and "interrupted; all of it is told here" in page
     assert any("goes on" in line for line in told(runs[-1], summary))
+
+
+def test_only_the_last_of_a_row_is_gone_on_with(runs: list[RunFolder]) -> None:
+    assert [last_of_row(run) for run in runs] == [RunFolder(runs[2].path)] * 3
+    with pytest.raises(CommandError, match=f"{runs[0].name} was gone on with already: give --resume {runs[2].name}"):
+        interrupted_run(runs[0].path, runs[0].path.parent)
+    assert interrupted_run(runs[2].path, runs[0].path.parent) == runs[2]
+
+
+def test_a_run_that_did_nothing_is_not_the_last_of_a_row(tmp_path: Path) -> None:
+    one, other = create(tmp_path, "a", MISSION), create(tmp_path, "b", MISSION)
+    RunNote(continues=one.name).write(other)
+    other.log.write_text('{"event": "run_created"}\n')
+    assert last_of_row(one) == one
 
 
 def test_a_run_that_was_removed_ends_the_row(runs: list[RunFolder], tmp_path: Path) -> None:
