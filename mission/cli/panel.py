@@ -35,7 +35,7 @@ def draw(scene: Scene, question: str | None = None, said: str = "", footer: str 
         parts.append(Text(f"  {said}", "bold cyan"))
     if question is not None:
         parts.append(Panel(Text.assemble((question, "bold"), "  y / n"), border_style="yellow"))
-    how = f"simulated × {scene.speed:g}" if scene.simulated else "[bold red]real vehicle[/]"
+    how = f"simulated × {scene.speed:.3g}" if scene.simulated else "[bold red]real vehicle[/]"
     return Panel(
         Group(*parts),
         title=f"[bold]{scene.mission}[/] · {clock(scene.now_s)} · {how}",
