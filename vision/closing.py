@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vision.candidates import LEAST_RUN, Candidate
 from vision.capture import Image
-from vision.ending import HOLE, Ending, Side, fit_ending, side_beside, side_of
+from vision.ending import CLEAR, HOLE, LEAST_SHARE, Ending, Side, fit_ending, side_beside, side_of
 from vision.evidence import Blade
 
 Array = NDArray[Any]  # of floats
@@ -19,12 +19,11 @@ Array = NDArray[Any]  # of floats
 MOST = 14  # candidates that are tried as edges of a blade that ends
 WORTH = 10.0  # of one unit of a candidate's worth, as evidence
 ALONE = -12.0  # evidence of a blade of which one edge is not seen
-CLEAR = 5.0  # evidence by which a blade that ends must be likelier than one that goes on
-LEAST_SHARE = 0.5  # of the lanes that close
 NARROWEST, WIDEST = np.deg2rad(20), np.deg2rad(84)  # angle of a spike
 OFF_AXIS = np.deg2rad(14)  # from a spike's middle to an edge of the blade, and to its dots
 AT_CORNER = 35.0  # px along the axis from where a spike's side meets an edge to where it ends
 PAST_PX = 60.0  # past its apex, over which a side of a spike must not go on
+MOST_PAST = 0.6  # of that stretch, on which a step may be seen all the same
 LEAST_PARTNER = -0.2  # worth of an edge beside which no dots lie
 LEAST_WORTH = -1.0  # of an edge behind a spike
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
@@ -73,11 +72,26 @@ def goes_on(edges: tuple[Candidate, ...]) -> bool:
 
 
 def unexplained(edges: tuple[Candidate, ...], blade: Blade) -> float:
-    """Share of missing dots among all that ought to lie on a blade with these edges."""
+    """Share of missing dots among all that ought to lie on a blade with these edges, beside the stretch of them that
+    dots lie beside; before the edge, where only one is known."""
+    if len(edges) == 1:
+        return edges[0].empty
     if not blade.grid_known or len(blade.absent) == 0:
         return 0.0
-    inside = np.all([blade.absent @ edge.outward < edge.rho - 4.0 for edge in edges], axis=0)
+    way = edges[0].profile.direction[edges[0].index]
+    along, gone = blade.dots @ way, blade.absent @ way
+    inside = (gone > along.min()) & (gone < along.max())
+    for edge in edges:
+        inside &= blade.absent @ edge.outward < edge.rho - 4.0
     return float(inside.sum() / (inside.sum() + len(blade.dots)))
+
+
+def contradicted(edges: tuple[Candidate, ...]) -> bool:
+    """Whether more speaks against edges that are seen nowhere else than where they are lost than for them."""
+    total = 0.0
+    for edge in edges:
+        total += float(side_of(edge, edge.profile.direction[edge.index]).evidence.sum()) + WORTH * edge.worth
+    return total < 0
 
 
 def find_closed(
@@ -146,6 +160,8 @@ def _up_to(side: Candidate, apex: Array, toward: Array) -> float:
         return -np.inf
     before = (seen.stations > start - 1) & (seen.stations < station - 4)
     past = (seen.stations > station + 4) & (seen.stations < station + PAST_PX)
+    if past.any() and (seen.evidence[past] > 0).mean() > MOST_PAST:
+        return -np.inf
     return float(seen.evidence[before].sum() - seen.evidence[past].sum())
 
 

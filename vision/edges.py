@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate, weigh
 from vision.capture import Image
-from vision.closing import evidence_of, find_closed, goes_on, opposite, unexplained, with_partner
+from vision.closing import contradicted, evidence_of, find_closed, goes_on, opposite, unexplained, with_partner
 from vision.edge_fit import settled, trimmed
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
@@ -76,7 +76,7 @@ def find_edges(
         chosen = tuple(trimmed(edge, ending.toward, ending.shoulder - BEHIND_SHOULDER) for edge in closed.edges)
     elif chosen and (missing := unexplained(chosen, blade)) > MOST_MISSING:
         return Found((), axis, None, (f"no edge: {missing:.0%} of the dots within the likeliest ones are missing",))
-    elif evidence_of(chosen, blade) < 0:
+    elif contradicted(chosen):
         return Found((), axis, None, ("no edge: steps and dots contradict each other",))
     if ending is not None and not chosen:
         axis = float(np.arctan2(ending.toward[1], ending.toward[0]) % np.pi)

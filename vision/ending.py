@@ -28,6 +28,8 @@ NO_STREAK = (0.4, 0.6)  # of a step, and of the least one, that the longer sampl
 CORRELATED_PX = 8.0  # so far along an outline its steps tell the same
 SEEN, UNSEEN = 1.28, -2.0  # log of how much likelier an outline is to show a step, or none, than other places are
 CLOSED, OPEN = 1.4, -1.6  # the same where a lane ends
+CLEAR = 5.0  # evidence by which a blade that ends must be likelier than one that goes on
+LEAST_SHARE = 0.5  # of the lanes that close
 HOLE = -2.5  # of a missing dot inside the outline
 DOT_ROOM = 3.0  # px: a dot's centre may lie so far beyond the outline
 RIVAL = 25.0  # evidence within which the shapes are told apart by how well they fit
@@ -163,13 +165,19 @@ def fit_ending(
     along = along - skew * (share_of - 0.5) * wide
     beside = np.abs(share_of[:, None] - SHARES) * wide < 4.0
     quiet = np.where(beside, along[:, None], -np.inf).max(axis=0) - 4.0
-    least = max(3.0, 1.5 * noise, 0.2 * usual, 0.9 * blade.texture)
+    weakest = max(3.0, 1.5 * noise, 0.9 * blade.texture)
     size, seen = np.empty((2, LANES, len(s)))
     lower, upper = (np.array([side.offset, side.slope]) for side in sides)
     boxes = (BOX, LONG_BOX)
-    steps_in_lanes(smooth, lower, upper, toward, skew * wide, SHARES, s, quiet, boxes, NO_STREAK, least, size)
-    seen_in_lanes(size, least, int(HIDDEN_PX / STEP), SLACK, seen)
-    return _best(s, seen, size, sides, toward, blade, share_of, along, border, wide, skew)
+    found = None
+    for least in sorted({max(weakest, 0.2 * usual), weakest}, reverse=True):
+        steps_in_lanes(smooth, lower, upper, toward, skew * wide, SHARES, s, quiet, boxes, NO_STREAK, least, size)
+        seen_in_lanes(size, least, int(HIDDEN_PX / STEP), SLACK, seen)
+        found = _best(s, seen, size, sides, toward, blade, share_of, along, border, wide, skew)
+        # Where dots tell that the blade ends, its end may show less than its edges do.
+        if found is None or found.share >= LEAST_SHARE or found.evidence < found.goes_on + CLEAR:
+            break
+    return found
 
 
 def _best(
