@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from mission.executive.events import EVENTS
 from mission.language.cycles import components, cyclic, shortest_cycle
@@ -24,11 +26,12 @@ class Way:
 @dataclass(frozen=True)
 class Failure:
     """Why a property does not hold, with the shortest trace that shows it. kind: unanswered, deadlock, livelock,
-    airborne, vision or invariant."""
+    airborne, vision or invariant. leaves: those that the message is about."""
 
     kind: str
     message: str
     trace: tuple[Edge, ...] = ()
+    leaves: tuple[str, ...] = ()
 
 
 class Endings:
@@ -41,6 +44,7 @@ class Endings:
         self.exploration = exploration
         self.vision = vision
         self.assumptions: set[str] = set()
+        self.order = {situation: number for number, situation in enumerate(exploration.situations)}
         self.edges: dict[Situation, list[Edge]] = {s: self._automatic(s) for s in exploration.situations}
         self.ways: dict[Situation, Way] = {}
         self.troubles: dict[Situation, Failure] = {}
@@ -78,7 +82,7 @@ class Endings:
         if state.final is not None:
             if situation.airborne and state.final != "released":
                 message = f"the mission ends in {situation.leaf!r} while the vehicle flies"
-                self.troubles[situation] = Failure("airborne", message)
+                self.troubles[situation] = Failure("airborne", message, leaves=(situation.leaf,))
             self.ways[situation] = Way(0, 0.0, ())
             return
         self._stuck(situation)
@@ -96,7 +100,7 @@ class Endings:
         self.ways[situation] = Way(best.steps, best.seconds + self._deadline_s(situation), best.trace)
 
     def _cycle(self, component: list[Situation], component_of: dict[Situation, int], number: int) -> None:
-        """Every way through the component: once more than its retries allow, each time over all of its states."""
+        """Every way through the component: once more than its retries allow, each time the longest way without them."""
         inside = set(component)
         retries = 0
         counted: set[str] = set()
@@ -112,23 +116,48 @@ class Endings:
                 elif edge.transition.key not in counted:
                     counted.add(edge.transition.key)
                     retries += edge.transition.retries
-        for part in components(component, bounded):
+        parts = components(component, bounded)
+        for part in parts:
             if cyclic(part, bounded) and not self.deadline_around(part):
-                path = shortest_cycle(part[0], part, bounded)
-                message = f"nothing ends the cycle {' → '.join(situation.leaf for situation in path)}"
+                path = shortest_cycle(min(part, key=self.order.__getitem__), part, bounded)
+                message = f"nothing ends the cycle {self.told(path)}"
+                failure = Failure("livelock", message, leaves=(path[0].leaf,))
                 for situation in component:
-                    self.troubles.setdefault(situation, Failure("livelock", message))
+                    self.troubles.setdefault(situation, failure)
+        steps_each, seconds_each = self._longest_without_retries(parts, bounded)
         rounds = retries + 1
         last = max(exits, key=lambda edge: (self.ways[edge.target].steps, self.ways[edge.target].seconds), default=None)
         onward = self.ways[last.target] if last is not None else Way(0, 0.0, ())
-        seconds = onward.seconds + rounds * sum(self._deadline_s(situation) for situation in component)
-        way = Way(onward.steps + rounds * len(component), seconds, (last, *onward.trace) if last is not None else ())
+        trace = (last, *onward.trace) if last is not None else ()
+        way = Way(onward.steps + rounds * steps_each, onward.seconds + rounds * seconds_each, trace)
         for edge in exits:
             if edge.target in self.troubles:
                 for situation in component:
                     self.troubles.setdefault(situation, self.troubles[edge.target])
         for situation in component:
             self.ways[situation] = way
+
+    def _longest_without_retries(
+        self, parts: list[list[Situation]], bounded: dict[Situation, list[Situation]]
+    ) -> tuple[int, float]:
+        """Most situations and most seconds on a way that takes no retry. parts: each after those it leads to."""
+        best: dict[Situation, tuple[int, float]] = {}
+        for part in parts:
+            onward = [best[target] for situation in part for target in bounded.get(situation, ()) if target in best]
+            steps = len(part) + max((steps for steps, _ in onward), default=0)
+            seconds = sum(self._deadline_s(situation) for situation in part)
+            seconds += max((seconds for _, seconds in onward), default=0.0)
+            best.update(dict.fromkeys(part, (steps, seconds)))
+        return max(steps for steps, _ in best.values()), max(seconds for _, seconds in best.values())
+
+    def told(self, path: Sequence[Situation]) -> str:
+        """A way without retries as text: `a → b (event) → a (event)`."""
+        said = [path[0].leaf]
+        for source, target in pairwise(path):
+            edges = (edge for edge in self.edges[source] if edge.target == target)
+            edge = next(edge for edge in edges if edge.transition.retries is None)
+            said.append(f"{target.leaf} ({edge.event})")
+        return " → ".join(said)
 
     def _stuck(self, situation: Situation) -> None:
         """A leaf that may last for ever, or whose end leads nowhere."""
@@ -138,7 +167,8 @@ class Endings:
         if not timed and not assumed:
             known = self._deadline_s(situation) < FOR_EVER
             why = "its deadline leads nowhere for sure" if known else "it has no deadline"
-            self.troubles[situation] = Failure("deadlock", f"the mission can stay in {situation.leaf!r}: {why}")
+            message = f"the mission can stay in {situation.leaf!r}: {why}"
+            self.troubles[situation] = Failure("deadlock", message, leaves=(situation.leaf,))
 
     def _deadline_s(self, situation: Situation) -> float:
         states = self.exploration.mission.states

@@ -1,7 +1,8 @@
 """Everywhere a mission can get to: every leaf it can be in, on the ground or in the air, and every step between them.
 
-Guards are taken as free, retries as used up or not, and history as any place that was reached: more is explored than
-can happen, never less. Whether the vehicle flies follows from the behaviours that take it up and down.
+Guards are taken as free and retries as used up or not: more is explored than can happen, never less. History is
+followed as it is remembered; where that is too much to explore, it leads to any place that was reached. Whether the
+vehicle flies follows from the behaviours that take it up and down.
 """
 
 from __future__ import annotations
@@ -14,18 +15,21 @@ from functools import cached_property
 from mission.behaviours.behaviour import Behaviour, behaviours
 from mission.executive.events import EVENTS, Event, Severity
 from mission.language.document import Mission, State, Transition, enclosing
+from mission.language.remembering import Memory, Remembering, remembering
 
 TAKES_OFF = "take_off"
 LANDS = {"land": frozenset({"landed"})}
 _BY_REQUEST = ("step", "skip")
+_MOST = 4000  # situations that are told apart by what is remembered
 
 
 @dataclass(frozen=True, order=True)
 class Situation:
-    """A leaf, and whether the vehicle may be in the air on entering it."""
+    """A leaf, whether the vehicle may be in the air on entering it, and what is remembered: composite → leaf."""
 
     leaf: str
     airborne: bool
+    memory: Memory = ()
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,9 @@ class Exploration:
         self.mission = mission
         self.edges: dict[Situation, tuple[Edge, ...]] = {}
         self.came_by: dict[Situation, Edge | None] = {}
-        self._remembered: frozenset[str] = frozenset()
+        self._skips = [Transition("skip", path, "") for path, state in mission.states.items() if state.entry]
+        self._reached: frozenset[str] = frozenset()
+        self._remembering: Remembering | None = None
         self._explore()
 
     @property
@@ -126,25 +132,42 @@ class Exploration:
         return frozenset(situation.leaf for situation in found if situation.leaf not in hopeful)
 
     def _explore(self) -> None:
-        """Repeated until no round finds a new place: a history leads wherever the round before has been."""
+        """First with a history that leads anywhere, repeated until no round finds a new place; then as remembered."""
         while True:
             known = frozenset(situation.leaf for situation in self.came_by)
-            self._remembered = known
-            self.came_by, self.edges = {}, {}
-            self._spread(Situation(self.mission.leaf(self.mission.initial), False))
-            # An operator may skip to an entry from anywhere in the mission; it is explored last, in the air.
-            for path, state in self.mission.states.items():
-                if state.entry:
-                    self._spread(Situation(self.mission.leaf(path), True))
+            self._reached = known
+            self._everything()
             if known == {situation.leaf for situation in self.came_by}:
-                return
+                break
+        if any(edge.transition.history is not None for edge in self.all_edges()):
+            free = self.came_by, self.edges
+            entries = frozenset(self.mission.leaf(skip.target) for skip in self._skips)
+            self._remembering = remembering(self.mission, self.all_edges(), entries)
+            if not self._everything(_MOST):
+                self.came_by, self.edges = free
 
-    def _spread(self, first: Situation) -> None:
+    def _everything(self, most: int | None = None) -> bool:
+        """Explore from the beginning; False where that leads to more situations than wanted."""
+        self.came_by, self.edges = {}, {}
+        self._spread(Situation(self.mission.leaf(self.mission.initial), False), None, most)
+        # An operator may skip to an entry from anywhere in the mission; that is explored last, in the air.
+        waiting = deque(self.came_by if self._skips else ())
+        while waiting and (most is None or len(self.came_by) <= most):
+            situation = waiting.popleft()
+            known = len(self.came_by)
+            for skip in self._skips if self.state(situation).final is None else ():
+                leaf, memory = self._after(situation, skip)
+                there = Situation(leaf, True, memory)
+                self._spread(there, Edge(situation, skip.event, skip, there), most)
+            waiting.extend(list(self.came_by)[known:])
+        return most is None or len(self.came_by) <= most
+
+    def _spread(self, first: Situation, by: Edge | None, most: int | None) -> None:
         if first in self.came_by:
             return
-        self.came_by[first] = None
+        self.came_by[first] = by
         waiting = deque([first])
-        while waiting:
+        while waiting and (most is None or len(self.came_by) <= most):
             situation = waiting.popleft()
             self.edges[situation] = tuple(self._steps(situation))
             for edge in self.edges[situation]:
@@ -158,23 +181,28 @@ class Exploration:
         for name, origin in happening(self.mission, situation.leaf):
             for transition in possible(self.mission, origin, name):
                 airborne = self._airborne_after(situation, name)
-                for leaf in self._ends(transition):
-                    yield Edge(situation, name, transition, Situation(leaf, airborne))
+                for leaf, memory in self._ends(situation, transition):
+                    yield Edge(situation, name, transition, Situation(leaf, airborne, memory))
 
     def _airborne_after(self, situation: Situation, event: str) -> bool:
         landed = LANDS.get(self.state(situation).do or "", frozenset())
         return self.flying(situation) and event not in landed
 
-    def _ends(self, transition: Transition) -> Iterator[str]:
-        mission, target = self.mission, transition.target
-        first = mission.leaf(target)
-        yield first
-        if transition.history is None:
+    def _after(self, situation: Situation, transition: Transition) -> tuple[str, Memory]:
+        if self._remembering is None:
+            return self.mission.leaf(transition.target), ()
+        return self._remembering.after(situation.leaf, situation.memory, transition)
+
+    def _ends(self, situation: Situation, transition: Transition) -> Iterator[tuple[str, Memory]]:
+        first, memory = self._after(situation, transition)
+        yield first, memory
+        if transition.history is None or self._remembering is not None:
             return
-        leaves = {leaf for leaf in self._remembered if target in enclosing(leaf)}
+        mission, target = self.mission, transition.target
+        leaves = {leaf for leaf in self._reached if target in enclosing(leaf)}
         if transition.history == "shallow":
             leaves = {mission.leaf(f"{target}.{leaf[len(target) + 1 :].split('.')[0]}") for leaf in leaves}
-        yield from sorted(leaves - {first})
+        yield from ((leaf, ()) for leaf in sorted(leaves - {first}))
 
 
 def happening(mission: Mission, leaf: str) -> Iterator[tuple[str, str]]:

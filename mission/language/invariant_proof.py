@@ -45,18 +45,23 @@ def _avoidable(
         situation: [e.target for e in graph.edges[situation] if e.target in outside and e.transition.retries is None]
         for situation in away
     }
-    for situation in away:
+    rounds = {
+        min(component, key=graph.order.__getitem__): component
+        for component in components(away, after)
+        if cyclic(component, after) and not graph.deadline_around(component)
+    }
+    for situation in away:  # the nearest first
+        trouble = graph.troubles.get(situation)
         if exploration.state(situation).final is not None:
             message = f"the mission can end in {situation.leaf!r} without {invariant.statement}"
-            return Failure("invariant", message, exploration.trace(situation))
-        trouble = graph.troubles.get(situation)
-        if trouble is not None and trouble.kind == "deadlock" and f"{situation.leaf!r}" in trouble.message:
-            return Failure("invariant", trouble.message, exploration.trace(situation))
-    for component in components(away, after):
-        if cyclic(component, after) and not graph.deadline_around(component):
-            path = shortest_cycle(component[0], component, after)
-            message = f"{' → '.join(s.leaf for s in path)} can go on for ever without {invariant.statement}"
-            return Failure("invariant", message, exploration.trace(component[0]))
+        elif trouble is not None and trouble.kind == "deadlock" and situation.leaf in trouble.leaves:
+            message = trouble.message
+        elif situation in rounds:
+            path = shortest_cycle(situation, rounds[situation], after)
+            message = f"{graph.told(path)} can go on for ever without {invariant.statement}"
+        else:
+            continue
+        return Failure("invariant", message, exploration.trace(situation))
     return None
 
 

@@ -6,7 +6,6 @@ an autopilot that is asked to land again and again does so, which every report r
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -117,11 +116,10 @@ def _must_answer(event: Event, situation: Situation, exploration: Exploration) -
 def _to_trouble(graph: Endings, start: Situation, trouble: Failure) -> tuple[Edge, ...]:
     """The shortest automatic way to a situation that has this trouble of its own."""
     came: dict[Situation, Edge | None] = {start: None}
-    named = set(re.findall(r"[\w.]+", trouble.message))
     waiting = [start]
     for situation in waiting:
         onward = [edge for edge in graph.edges[situation] if graph.troubles.get(edge.target) == trouble]
-        if not onward or situation.leaf in named:
+        if not onward or situation.leaf in trouble.leaves:
             return _back(came, situation)
         for edge in onward:
             if edge.target not in came:
