@@ -10,7 +10,9 @@ from mission.behaviours.behaviour import Parameters, behaviour
 from mission.behaviours.motion import wrap
 
 if TYPE_CHECKING:
+    from flight.guidance.follow import FollowCommand
     from mission.executive.services import Services
+    from vision.estimate import BladeEstimate
 
 
 class AlignGimbal(Parameters):
@@ -34,19 +36,14 @@ async def align_gimbal(services: Services, parameters: AlignGimbal) -> str:
     from mission.behaviours.following import Following
 
     following = Following(services, side=parameters.side, toward="tip", standoff_m=parameters.standoff_m)
-    good_since: float | None = None
-    async for now in services.ticks():
-        steered = following.tick(now)
-        if steered is None:
-            continue
-        estimate, command = steered
+
+    def squarely(estimate: BladeEstimate, command: FollowCommand) -> bool:
         pose = services.autopilot.telemetry.pose
         error = np.hypot(wrap(float(pose.gimbal[0]) - command.gimbal_yaw), pose.gimbal[1] - command.gimbal_pitch)
         side = following.side(estimate)
         seen = side is not None and side.age_s < 0.6
         services.progress.text = f"gimbal {np.degrees(error):.1f}° off, edge {'seen' if seen else 'not seen'}"
-        good = seen and error < np.deg2rad(parameters.tolerance_deg) and estimate.age_s < 0.6
-        good_since = (good_since if good_since is not None else now) if good else None
-        if good_since is not None and now - good_since >= parameters.steady_s:
-            return "aligned"
-    raise AssertionError("ticks never end")
+        return bool(seen and error < np.deg2rad(parameters.tolerance_deg) and estimate.age_s < 0.6)
+
+    await following.hold(squarely, parameters.steady_s)
+    return "aligned"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -67,6 +68,21 @@ class Following:
         self._services.autopilot.point_gimbal(command.gimbal_yaw, command.gimbal_pitch)
         self._services.progress.station_m = estimate.station_m
         return estimate, command
+
+    async def hold(self, good: Callable[[BladeEstimate, FollowCommand], bool], steady_s: float) -> None:
+        """Steer until `good` has said so at every tick for so long."""
+        since: float | None = None
+        async for now in self._services.ticks():
+            steered = self.tick(now)
+            if steered is None:
+                continue
+            if not good(*steered):
+                since = None
+                continue
+            since = now if since is None else since
+            if now - since >= steady_s:
+                return
+        raise AssertionError("ticks never end")
 
     def side(self, estimate: BladeEstimate) -> SideEstimate | None:
         """The followed edge in an estimate."""

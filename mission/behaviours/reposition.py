@@ -9,7 +9,9 @@ from pydantic import Field
 from mission.behaviours.behaviour import Parameters, behaviour
 
 if TYPE_CHECKING:
+    from flight.guidance.follow import FollowCommand
     from mission.executive.services import Services
+    from vision.estimate import BladeEstimate
 
 
 class Reposition(Parameters):
@@ -34,16 +36,12 @@ async def reposition(services: Services, parameters: Reposition) -> str:
     from mission.behaviours.following import Following
 
     following = Following(services, side=parameters.side, toward="root", standoff_m=parameters.standoff_m)
-    good_since: float | None = None
-    async for now in services.ticks():
-        steered = following.tick(now)
-        if steered is None:
-            continue
-        estimate, _ = steered
+
+    def in_view(estimate: BladeEstimate, command: FollowCommand) -> bool:
         side = following.side(estimate)
         seen = side is not None and (side.age_s < 0.6 or (side.age_s < BRIDGE_S and side.offset_sigma_m < SURE_M))
         services.progress.text = f"{parameters.side} edge {'in view' if seen else 'not in view yet'}"
-        good_since = (good_since if good_since is not None else now) if seen else None
-        if good_since is not None and now - good_since >= parameters.steady_s:
-            return "in_position"
-    raise AssertionError("ticks never end")
+        return seen
+
+    await following.hold(in_view, parameters.steady_s)
+    return "in_position"
