@@ -18,10 +18,12 @@ from vision.lines import sensor_noise
 
 Array = NDArray[Any]  # of floats
 
-LONGEST = 44  # px, of a streak in an image of WORKING_SIZE
-SCALES = (1.7, 4.2)  # px: of a dot, and of a streak
-AROUND = 31  # px: window in which a spot is compared with what is around it
-LEAST_SNR, LEAST_ISOLATION = 4.0, 3.0
+LONGEST = 32  # px, of a streak where dots are 20 to 45 px apart
+SCALES = (1.3, 2.6)  # px: of a dot, and of a streak
+AROUND = 25  # px: window in which a spot is compared with what is around it
+APART_PX = 5.0  # nearer to one that stands out more a spot is part of it
+MOST_AREA = 0.4 * LONGEST**2  # px, of a spot
+LEAST_SNR, LEAST_ISOLATION = 3.0, 2.2
 SHARES = (0.4, 0.55, 0.7, 0.8)  # of its height above which pixels belong to a spot, the first at which it is no larger
 
 
@@ -61,18 +63,16 @@ def _parts(spots: BrightSpots) -> tuple[Array, Array, Array]:
 
 
 def laser_signal(image: Image) -> Signal:
-    """The signal of an image (h, w) or (h, w, 3) of about WORKING_SIZE px. In colour the laser is what is greener than
-    its surroundings, or so bright that it has burnt out to white."""
+    """The signal of an image (h, w) or (h, w, 3). In colour the laser is what has more of one colour than its
+    surroundings, or is so bright that it has burnt out to white."""
     if image.ndim == 2:
         noise = sensor_noise(image[:, :, None])
         rise = _rise(image.astype(np.float32))
     else:
-        blue, bright, red = (image[:, :, k].astype(np.float32) for k in range(3))
         noise = sensor_noise(np.ascontiguousarray(image[:, :, 1:2]))
-        rise = _rise(bright)
-        excess = bright - 0.5 * (blue + red)
-        if float(np.abs(blue - red).mean()) + float(np.abs(excess).mean()) > 0.2 * noise:
-            rise = np.maximum(0.5 * rise, _rise(excess))
+        total = image.sum(axis=2, dtype=np.float32)
+        highest = image.max(axis=2).astype(np.float32)
+        rise = np.maximum(0.5 * _rise(highest), _rise(1.5 * highest - 0.5 * total))
     blob = np.zeros_like(rise)
     for sigma in SCALES:
         blob = np.maximum(blob, _blob(rise, sigma))
@@ -80,24 +80,24 @@ def laser_signal(image: Image) -> Signal:
     return Signal(rise, blob, max(0.12 * noise, 0.08))
 
 
-def bright_spots(signal: Signal, most: int = 500) -> BrightSpots:
+def bright_spots(signal: Signal, most: int = 320) -> BrightSpots:
     """The spots that stand out most among their surroundings."""
     blob = signal.blob
     box = (AROUND, AROUND)
     mean = cv2.blur(blob, box)
     spread = cv2.blur(cv2.absdiff(blob, mean), box)
     isolation = (blob - mean) / np.maximum(spread, signal.noise)
-    highest = cv2.dilate(blob, np.ones((9, 9), np.uint8))
+    highest = cv2.dilate(blob, np.ones((7, 7), np.uint8))
     top = (blob >= highest) & (blob > LEAST_SNR * signal.noise) & (isolation > LEAST_ISOLATION)
     v, u = np.nonzero(top)
-    order = np.argsort(-isolation[v, u], kind="stable")[: 2 * most]
+    order = np.argsort(-isolation[v, u], kind="stable")[: most + most // 4]
     found = [measured(signal, int(u[k]), int(v[k])) for k in order]
     good = [k for k, spot in enumerate(found) if spot is not None]
     uv = np.array([found[k][:2] for k in good]).reshape(-1, 2)  # type: ignore[index]
     level = np.array([found[k][2] for k in good])  # type: ignore[index]
     stands = isolation[v[order[good]], u[order[good]]] if good else np.zeros(0)
     apart = np.hypot(*(uv[:, None] - uv[None]).transpose(2, 0, 1))
-    alone = ~np.triu(apart < 7, 1).any(axis=0) if len(uv) else np.zeros(0, bool)
+    alone = ~np.triu(apart < APART_PX, 1).any(axis=0) if len(uv) else np.zeros(0, bool)
     return BrightSpots(uv[alone][:most], level[alone][:most], stands[alone][:most])
 
 
@@ -125,7 +125,7 @@ def without_laser(image: Image, signal: Signal, uv: Array) -> Image:
         found = _own(patch, u - left, v - upper, _summit(patch, u - left, v - upper), (0.15, *SHARES))
         if found is not None:
             mask[upper : upper + patch.shape[0], left : left + patch.shape[1]] |= found[0].astype(np.uint8)
-    mask = np.asarray(cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))), np.uint8)
+    mask = np.asarray(cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))), np.uint8)
     filled = [cv2.inpaint(np.ascontiguousarray(plane), mask, 3, cv2.INPAINT_TELEA) for plane in cv2.split(image)]
     return np.asarray(np.minimum(np.dstack(filled), image), np.uint8)
 
@@ -149,11 +149,11 @@ def _own(
     for share in shares:
         mask = (patch > share * level).astype(np.uint8)
         mask[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2] = 1
-        _, labels = cv2.connectedComponents(mask, connectivity=8)
-        own = labels == labels[v, u]
-        rows, columns = np.flatnonzero(own.any(axis=1)), np.flatnonzero(own.any(axis=0))
-        if max(rows[-1] - rows[0], columns[-1] - columns[0]) < LONGEST and own.mean() < 0.25:
-            return np.asarray(own), share * level
+        _, labels, boxes, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+        label = int(labels[v, u])
+        _, _, wide, high, area = boxes[label].tolist()
+        if max(wide, high) <= LONGEST and area < MOST_AREA:
+            return np.asarray(labels == label), share * level
     return None
 
 

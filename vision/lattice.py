@@ -6,49 +6,46 @@ its settled neighbours leads.
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.lattice_seeds import MOST_STEP, UNLIKE, frames_of, reduced
+from vision.lattice_kernels import SIDE, expect, grow
+from vision.lattice_seeds import frames_of, reduced
 
 Array = NDArray[Any]  # of floats
 Indices = NDArray[np.int64]
 Place = tuple[int, int]
 
-OFF_SHADE = 0.45  # by which the brightness around neighbouring dots may differ
-OFF_STEP = 0.2  # of the spacing: how far from where its neighbours expect it a dot may lie
+NO_FAINTER = 0.5  # than half of its dots: a spot among them that is none of them speaks against a lattice
 SEEDS = 40  # spots from which a lattice is grown
-STEP_SIGMA, BEND_SIGMA, PLACE_SIGMA = 0.15, 0.1, 0.02  # of the spacing: what is known of the next dot beforehand
+ENOUGH = 0.7  # of the light of all spots, in a lattice that needs no rival
 ROUND_ABOUT = [(0, 1), (0, -1), (1, 0), (-1, 0)]
-WINDOW = sorted(  # places around one, the nearest first
-    ((dr, dc) for dr in range(-3, 4) for dc in range(-3, 4) if 0 < dr * dr + dc * dc <= 10),
-    key=lambda d: (d[0] ** 2 + d[1] ** 2, d),
-)
-NEAR_BY = [*ROUND_ABOUT, (1, 1), (1, -1), (-1, 1), (-1, -1), (0, 2), (0, -2), (2, 0), (-2, 0)]
 
 
 @dataclass(frozen=True)
 class Lattice:
     """Which spots form it (n,), their rows and columns (n,) counted from zero.
 
-    steps (2, 2): px from one dot to the next column, and to the next row. spacing: px, the lesser of the two."""
+    steps (2, 2): px from one dot to the next column, and to the next row. spacing: px, the lesser of the two. worth: of
+    the light that its spots have, and that others have among them."""
 
     member: Indices
     row: Indices
     column: Indices
     steps: Array
     spacing: float
+    worth: float = 0.0
 
     def __len__(self) -> int:
         return len(self.member)
 
 
 def find_lattice(uv: Array, level: Array, shade: Array) -> Lattice | None:
-    """The largest lattice among spots (n, 2), rows counted down and columns to the right as nearly as it lies. None
+    """The worthiest lattice among spots (n, 2), rows counted down and columns to the right as nearly as it lies. None
     with fewer than four dots.
 
     level (n,): heights of the spots. shade (n,): how bright it is around each; the lattice does not step where that
@@ -56,29 +53,64 @@ def find_lattice(uv: Array, level: Array, shade: Array) -> Lattice | None:
     if len(uv) < 4:
         return None
     best: dict[Place, int] = {}
-    frame = np.zeros((2, 2))
+    most, frame = 0.0, np.zeros((2, 2))
     used: set[int] = set()
-    seeds = [seed for seed in frames_of(uv, level) if seed[0] >= 4]
+    seeds = sorted(
+        (seed for seed in frames_of(uv, level) if seed[0] >= 4),
+        key=lambda seed: (-seed[0] * float(np.sqrt(level[seed[1]])), seed[1]),
+    )
+    light = np.sqrt(level)
+    whole = float(light[[seed[1] for seed in seeds]].sum())
     for _, start, steps in seeds[:SEEDS]:
         if start in used:
             continue
-        if 3 * len(best) > 2 * len(seeds):
-            break  # most of what lies evenly is in it already
         grown = _held(uv, _grown(uv, level, shade, {(0, 0): start}, steps))
         used |= set(grown.values())
-        if len(grown) > len(best):
-            best, frame = grown, steps
-    return lattice_of(uv, best, frame) if len(best) >= 4 else None
+        worth = worth_of(uv, level, list(grown.values()))
+        if worth > most:
+            best, most, frame = grown, worth, steps
+            if float(light[list(best.values())].sum()) > ENOUGH * whole:
+                break  # most of what lies evenly is in it already
+    return lattice_of(uv, level, best, frame) if len(best) >= 4 else None
+
+
+def worth_of(uv: Array, level: Array, member: list[int]) -> float:
+    """Light of a lattice's spots, less that of others among them that are no fainter: dots leave none out."""
+    if len(member) < 4:
+        return 0.0
+    light = np.sqrt(level)
+    hull = cv2.convexHull(uv[member].astype(np.float32))
+    others = np.setdiff1d(np.flatnonzero(level > NO_FAINTER * np.median(level[member])), member)
+    among = [k for k in others.tolist() if cv2.pointPolygonTest(hull, (float(uv[k, 0]), float(uv[k, 1])), False) > 0]
+    return float(light[member].sum() - light[among].sum())
 
 
 def grown_on(uv: Array, level: Array, shade: Array, lattice: Lattice) -> Lattice:
     """The lattice grown on over further spots: its own are the first len(lattice) of uv (n, 2), in its order."""
     start = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(lattice.row, lattice.column, strict=True))}
     steps = _mean_steps(uv, start)
-    return lattice_of(uv, _held(uv, _grown(uv, level, shade, start, steps)), steps)
+    grown = _held(uv, _grown(uv, level, shade, start, steps))
+    return lattice_of(uv, level, grown, steps) if len(grown) >= 4 else lattice
 
 
-def lattice_of(uv: Array, at: dict[Place, int], steps: Array) -> Lattice:
+def kept(uv: Array, level: Array, lattice: Lattice, which: NDArray[np.bool_]) -> Lattice | None:
+    """What is left of a lattice with only some (n,) of its dots; None where that is none."""
+    parts = zip(
+        lattice.row[which].tolist(), lattice.column[which].tolist(), lattice.member[which].tolist(), strict=True
+    )
+    at = _held(uv, {(r, c): spot for r, c, spot in parts})
+    return lattice_of(uv, level, at, lattice.steps) if len(at) >= 4 else None
+
+
+def between(uv: Array, lattice: Lattice) -> Array:
+    """Middles (m, 2) px of the cells whose four corners all have dots."""
+    at = {(int(r), int(c)): uv[m] for r, c, m in zip(lattice.row, lattice.column, lattice.member, strict=True)}
+    cells = [[(r, c), (r + 1, c), (r, c + 1), (r + 1, c + 1)] for r, c in at]
+    middles = [np.mean([at[corner] for corner in cell], axis=0) for cell in cells if all(k in at for k in cell)]
+    return np.array(middles).reshape(-1, 2)
+
+
+def lattice_of(uv: Array, level: Array, at: dict[Place, int], steps: Array) -> Lattice:
     """The lattice of spots (n, 2) that stand at places, oriented and counted from zero."""
     spots = sorted((spot, place) for place, spot in at.items())
     member = np.array([spot for spot, _ in spots], np.int64)
@@ -90,15 +122,21 @@ def lattice_of(uv: Array, at: dict[Place, int], steps: Array) -> Lattice:
     place = place @ turned
     place -= place.min(axis=0)
     spacing = float(min(np.hypot(*right), np.hypot(*down)))
-    return Lattice(member, place[:, 0], place[:, 1], np.stack([right, down]), spacing)
+    worth = worth_of(uv, level, member.tolist())
+    return Lattice(member, place[:, 0], place[:, 1], np.stack([right, down]), spacing, worth)
 
 
 def onward(uv: Array, lattice: Lattice) -> Array:
     """Where the lattice of spots (n, 2) would go on but does not: next to its dots, (m, 2) px."""
     at = {(int(r), int(c)): int(m) for r, c, m in zip(lattice.row, lattice.column, lattice.member, strict=True)}
-    frames = dict.fromkeys(at, lattice.steps)
-    free = {(r + dr, c + dc) for r, c in at for dr, dc in ROUND_ABOUT} - set(at)
-    return np.array([_expected(uv, at, place, frames)[0] for place in sorted(free)]).reshape(-1, 2)
+    free = sorted({(r + dr, c + dc) for r, c in at for dr, dc in ROUND_ABOUT} - set(at))
+    table, frames, origin = _table(at, lattice.steps)
+    fit, near, found = np.zeros((3, 2)), np.zeros(4, np.int32), []
+    for place in free:
+        row, column = place[0] + origin[0], place[1] + origin[1]
+        if 0 <= row < SIDE and 0 <= column < SIDE and expect(uv, table, frames, row, column, fit, near):
+            found.append(fit[0].copy())
+    return np.array(found).reshape(-1, 2)
 
 
 def outer(lattice: Lattice) -> NDArray[np.bool_]:
@@ -131,84 +169,23 @@ def missing(uv: Array, lattice: Lattice) -> Array:
     return np.array(found).reshape(-1, 2)
 
 
+def _table(at: dict[Place, int], steps: Array) -> tuple[NDArray[np.int32], Array, Place]:
+    """Places as a table, the steps at each, and what is added to a place to find it there."""
+    places = np.array(list(at))
+    row, column = (SIDE // 2 - (places.min(axis=0) + places.max(axis=0)) // 2).tolist()
+    table = np.full((SIDE, SIDE), -1, np.int32)
+    for (r, c), spot in at.items():
+        if 0 <= r + row < SIDE and 0 <= c + column < SIDE:
+            table[r + row, c + column] = spot
+    return table, np.broadcast_to(steps, (SIDE, SIDE, 2, 2)).copy(), (row, column)
+
+
 def _grown(uv: Array, level: Array, shade: Array, start: dict[Place, int], steps: Array) -> dict[Place, int]:
-    """Spots by their places, from those at the start outward, the surest link first, so that a stray spot finds its
-    place taken."""
-    at = dict(start)
-    taken = np.zeros(len(uv), bool)
-    taken[list(at.values())] = True
-    frames = dict.fromkeys(at, steps)
-    heap: list[tuple[float, int, Place]] = []
-    log_level = np.log(level)
-
-    def look(target: Place) -> tuple[float, int, Array] | None:
-        """How far from expected the best spot for a place lies, in shares of what is allowed, which it is, and the
-        steps there."""
-        expected, local, neighbours = _expected(uv, at, target, frames)
-        off = uv - expected
-        near = np.flatnonzero((np.abs(off).max(axis=1) < MOST_STEP * OFF_STEP) & ~taken)
-        if len(near) == 0:
-            return None
-        away = np.hypot(*np.linalg.solve(local.T, off[near].T)) / OFF_STEP
-        unlike = np.abs(log_level[near] - np.median(log_level[neighbours])) / np.log(UNLIKE)
-        around = float(np.median(shade[neighbours]))
-        change = np.abs(shade[near] - around) / np.maximum(np.maximum(shade[near], around), 40.0)
-        cost = np.where((away < 1) & (unlike < 1) & (change < OFF_SHADE), away + 0.5 * unlike, np.inf)
-        best = int(np.argmin(cost))
-        return (float(cost[best]), int(near[best]), local) if np.isfinite(cost[best]) else None
-
-    def offer(place: Place) -> None:
-        for dr, dc in NEAR_BY:
-            target = (place[0] + dr, place[1] + dc)
-            if target not in at:
-                found = look(target)
-                if found is not None:
-                    heapq.heappush(heap, (found[0] + 0.3 * (abs(dr) + abs(dc) - 1), found[1], target))
-
-    for place in list(at):
-        offer(place)
-    while heap:
-        cost, spot, target = heapq.heappop(heap)
-        if target in at or taken[spot]:
-            continue
-        again = look(target)
-        if again is None:
-            continue
-        if again[1] != spot or again[0] > cost + 0.25:
-            heapq.heappush(heap, (max(again[0], cost), again[1], target))
-            continue
-        at[target], taken[spot], frames[target] = spot, True, again[2]
-        offer(target)
-    return at
-
-
-def _expected(
-    uv: Array, at: dict[Place, int], target: Place, frames: dict[Place, Array]
-) -> tuple[Array, Array, list[int]]:
-    """Where a place's dot is expected (2,): on the smooth surface through the settled dots near it, whose steps are
-    held to those of the nearest one; the steps (2, 2) there; and the nearest dots."""
-    r, c = target
-    spots, here = [], []
-    for dr, dc in WINDOW:
-        spot = at.get((r + dr, c + dc))
-        if spot is not None:
-            spots.append(spot)
-            here.append((dc, dr))
-    steps = frames[r + here[0][1], c + here[0][0]]
-    x, y = np.array(here, float).T
-    long, high = np.hypot(*steps.T)
-    size = min(long, high)
-    weight = 1 / (PLACE_SIGMA * size * (0.5 + np.hypot(x, y))) ** 2
-    design = np.column_stack([np.ones(len(x)), x, y, x * x, x * y, y * y])
-    prior = (
-        np.array([np.inf, *[STEP_SIGMA * long, STEP_SIGMA * high], *np.array([long, size, high]) * BEND_SIGMA]) ** -2
-    )
-    known = np.zeros((6, 2))
-    known[1:3] = steps
-    normal = design.T @ (design * weight[:, None])
-    normal[np.diag_indices(6)] += prior
-    fit = np.linalg.solve(normal, design.T @ (uv[spots] * weight[:, None]) + prior[:, None] * known)
-    return fit[0], fit[1:3], spots[:4]
+    """Spots by their places, grown from those at the start."""
+    table, frames, (row, column) = _table(start, steps)
+    grow(np.ascontiguousarray(uv, float), np.log(level), np.ascontiguousarray(shade, float), table, frames)
+    rows, columns = np.nonzero(table >= 0)
+    return {(r - row, c - column): int(table[r, c]) for r, c in zip(rows.tolist(), columns.tolist(), strict=True)}
 
 
 def _mean_steps(uv: Array, at: dict[Place, int], known: Array | None = None) -> Array:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from vision.lattice_kernels import UNLIKE
+
 Array = NDArray[Any]  # of floats
 
-LEAST_STEP, MOST_STEP = 17.0, 125.0  # px between neighbouring dots
+LEAST_STEP, MOST_STEP = 12.0, 64.0  # px between neighbouring dots
 SYMMETRIC = 0.17  # of a step: how unequal the steps to both sides of a dot may be
-UNLIKE = 4.0  # times as bright as its neighbour a dot may be
 
 
 def frames_of(uv: Array, level: Array) -> list[tuple[int, int, Array]]:

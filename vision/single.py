@@ -4,146 +4,135 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.bright_spots import BrightSpots, Signal, bright_spots, laser_signal, measured, without_laser
+from vision.bright_spots import without_laser
+from vision.candidates import Candidate, weigh
 from vision.capture import Image
-from vision.lattice import Lattice, find_lattice, grown_on, missing, onward, outer
+from vision.cut_end import with_cut_end
+from vision.dot_grid import DotGrid, find_dot_grid, resized
+from vision.edges import Found, edge_of, find_edges
+from vision.evidence import Blade, texture_between
+from vision.lattice import missing
+from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
-from vision.quality import exposure
-from vision.reduction import green, tones
-from vision.silhouette import Side, find_silhouette
-from vision.silhouette_view import edge_of, sharpness_of, tip_of
+from vision.quality import exposure, sharpness
+from vision.reduction import tones
 from vision.stopwatch import Now, Stopwatch
+from vision.tip import tip_of
 
 Array = NDArray[Any]  # of floats
 
-WORKING_SIZE = 612  # px of the longer side: dots then have the size they have elsewhere
 LEAST_DOTS = 6
-LEAST_SHARE = 0.25  # of its neighbours' height: a dot where the lattice goes on
-ROUNDS = 4  # in which the lattice goes on to fainter dots
+SPACING = 32.0  # px between dots, to which an image is brought before edges are sought in it
+MOST_OFF = 1.25  # times: what need not be brought to it
+STRAYS = 2.2  # dots that may lie beyond an edge all the same: on a string, say, or on what is behind the blade
+BEYOND_PX = 6.0  # a dot's middle may lie so far beyond an edge
+MOST_LINES = 220
+COLOURLESS = 1.5  # grey levels by which colours differ on average in a grey image
 
 
 def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = None) -> BladeObservation:
     """Dots, edges and tip of a laser-on photograph (h, w) or (h, w, 3); pixels of this image. `valid` means that
     edges were found; distance, points and matches stay None. now: the clock that `elapsed_ms` is told by."""
     watch = Stopwatch(now)
-    small, scale = _at_working_size(image)
+    plain = as_photograph(image)
     watch.lap("reduce")
-    signal = laser_signal(small)
-    spots, lattice = dots_of(signal, green(small))
+    grid = find_dot_grid(plain)
     watch.lap("dots")
-    if lattice is None or len(lattice) < LEAST_DOTS:
-        count = 0 if lattice is None else len(lattice)
-        return BladeObservation(
-            stamp_s, False, (f"{len(spots)} bright spots, {count} of them in a grid",), elapsed_ms=watch.elapsed_ms
-        )
-    height, width = small.shape[:2]
-    centre = (np.array([width, height]) - 1) / 2
-    seeds = spots.uv[lattice.member]
-    clean = without_laser(tones(small), signal, _shining(spots, lattice))
-    absent = missing(spots.uv, lattice)
-    absent = absent[(absent > 4).all(axis=1) & (absent < 2 * centre - 4).all(axis=1)]
-    dots = seeds - centre
-    outline = find_silhouette(clean, dots, dots[outer(lattice)], absent - centre, lattice.spacing)
+    if grid is None or grid.lattice is None or len(grid.lattice) < LEAST_DOTS:
+        return BladeObservation(stamp_s, False, (_too_few(grid),), elapsed_ms=watch.elapsed_ms)
+    lattice = grid.lattice
+    clean = without_laser(tones(grid.image), grid.signal, grid.shining())
+    factor = SPACING / lattice.spacing
+    if 1 / MOST_OFF < factor < MOST_OFF:
+        factor = 1.0
+    clean = resized(clean, factor).reshape(round(clean.shape[0] * factor), -1, clean.shape[2])
+    centre = (np.array(clean.shape[1::-1]) - 1) / 2
+    dots, absent = (
+        (uv + 0.5) * factor - 0.5 - centre for uv in (grid.spots.uv[lattice.member], missing(grid.spots.uv, lattice))
+    )
+    absent = absent[(np.abs(absent) < centre - 6).all(axis=1)]
+    found = _outline(clean, dots, absent)
     watch.lap("edges")
-    edges, axis = outline.edges, outline.axis
+    edges, axis, to_photograph = found.edges, found.axis, 1 / (factor * grid.scale)
     return BladeObservation(
         stamp_s=stamp_s,
         valid=bool(edges),
-        reasons=outline.reasons,
-        dots_left=Dots((seeds + 0.5) / scale - 0.5, lattice.row, lattice.column),
-        edges=tuple(edge_of(edge, 1 / scale) for edge in _left_first(edges, axis)),
-        tip=tip_of(outline, dots, 1 / scale),
+        reasons=found.reasons,
+        dots_left=_dots(grid, _on_blade(dots, found)),
+        edges=tuple(edge_of(edge, to_photograph) for edge in _left_first(edges, axis)),
+        tip=None if found.ending is None else tip_of(found.ending, to_photograph),
         heading=axis if edges else None,
         heading_sigma=float(np.deg2rad(1.0 if len(edges) == 2 else 3.0)) if edges else None,
-        sharpness=sharpness_of(clean, edges),
-        exposure=exposure(clean, seeds),
+        sharpness=sharpness(clean, edges),
+        exposure=exposure(clean, dots + centre),
         elapsed_ms=watch.elapsed_ms,
     )
 
 
 def grid_of(image: Image) -> Dots | None:
     """The dots of a laser-on image (h, w) or (h, w, 3) with rows and columns counted from the first that is seen."""
-    small, scale = _at_working_size(image)
-    spots, lattice = dots_of(laser_signal(small), green(small))
-    if lattice is None:
+    grid = find_dot_grid(as_photograph(image))
+    if grid is None or grid.lattice is None:
         return None
-    return Dots((spots.uv[lattice.member] + 0.5) / scale - 0.5, lattice.row, lattice.column)
+    return _dots(grid, np.ones(len(grid.lattice), bool))
 
 
-def dots_of(signal: Signal, bright: Image) -> tuple[BrightSpots, Lattice | None]:
-    """The spots and the lattice that some of them form; its faint dots are sought where it says that they are."""
-    spots = bright_spots(signal)
-    around = cv2.medianBlur(bright, 21)
-    lattice = find_lattice(spots.uv, spots.level, _shade(around, spots.uv))
-    for _ in range(ROUNDS):
-        if lattice is None:
-            break
-        faint = _faint(signal, spots, lattice)
-        if not len(faint):
-            break
-        others = np.setdiff1d(np.arange(len(spots)), lattice.member)
-        order = np.concatenate([lattice.member, others])
-        spots = spots.take(order).joined(faint)
-        before = len(lattice)
-        lattice = grown_on(spots.uv, spots.level, _shade(around, spots.uv), lattice)
-        if len(lattice) <= before:
-            break
-    return spots, lattice
+def as_photograph(image: Image) -> Image:
+    """An image of any kind as (h, w) or (h, w, 3) of bytes: 16 bits are brought to 8, colours that are all alike to
+    grey, transparency is left aside."""
+    values = np.asarray(image)
+    if values.ndim == 3 and values.shape[2] in (1, 2):
+        values = values[:, :, 0]
+    elif values.ndim == 3:
+        values = values[:, :, :3]
+    if values.dtype != np.uint8:
+        values = np.nan_to_num(values.astype(np.float32), posinf=0.0, neginf=0.0)
+        highest = float(values.max(initial=0.0))
+        largest = 1.0 if highest <= 1 else 255.0 if highest < 256 else 65535.0 if highest > 4095 else 4095.0
+        values = np.clip(np.rint(values * (255.0 / largest)), 0, 255).astype(np.uint8)
+    if values.ndim == 3:
+        some = values[:: max(values.shape[0] // 256, 1), :: max(values.shape[1] // 256, 1)].astype(np.int16)
+        if some.size and float(np.ptp(some, axis=2).mean()) < COLOURLESS:
+            values = values[:, :, 1]
+    return np.ascontiguousarray(values)
 
 
-def _faint(signal: Signal, spots: BrightSpots, lattice: Lattice) -> BrightSpots:
-    """Summits of the blob response where the lattice would go on, too faint to stand out by themselves."""
-    height, width = signal.blob.shape
-    reach = max(2, round(0.15 * lattice.spacing))
-    typical = float(np.median(spots.level[lattice.member]))
-    found = []
-    for u, v in np.rint(onward(spots.uv, lattice)).astype(int).tolist():
-        if not (reach <= u < width - reach and reach <= v < height - reach):
-            continue
-        part = signal.blob[v - reach : v + reach + 1, u - reach : u + reach + 1]
-        down, across = divmod(int(part.argmax()), part.shape[1])
-        if min(down, across) == 0 or max(down, across) == 2 * reach or part.max() < 2.5 * signal.noise:
-            continue
-        spot = measured(signal, u - reach + across, v - reach + down)
-        if spot is None or spot[2] < LEAST_SHARE * typical:
-            continue
-        if np.hypot(*(spots.uv - spot[:2]).T).min() > 5:
-            found.append(spot)
-    table = np.array(found).reshape(-1, 3)
-    return BrightSpots(table[:, :2], table[:, 2], np.zeros(len(table)))
+def _on_blade(dots: Array, found: Found) -> NDArray[np.bool_]:
+    """Which dots (n, 2) lie on the blade: none that is far beyond an edge does."""
+    inside = np.ones(len(dots), bool)
+    for edge in found.edges:
+        inside &= dots @ edge.outward < edge.rho + BEYOND_PX
+    return inside
 
 
-def _shining(spots: BrightSpots, lattice: Lattice) -> Array:
-    """Where the laser shines on the blade, (n, 2) px: the lattice's dots, and what they mirror between themselves."""
-    own = spots.uv[lattice.member]
-    bright = spots.level > 0.1 * float(np.median(spots.level[lattice.member]))
-    hull = cv2.convexHull(own.astype(np.float32))
-    within = [cv2.pointPolygonTest(hull, (float(u), float(v)), False) >= 0 for u, v in spots.uv]
-    chosen = bright & np.array(within)
-    chosen[lattice.member] = True
-    return np.asarray(spots.uv[chosen], float)
+def _dots(grid: DotGrid, which: NDArray[np.bool_]) -> Dots:
+    """Some of the lattice's dots, counted from the first row and column that is seen."""
+    assert grid.lattice is not None
+    row, column = grid.lattice.row[which], grid.lattice.column[which]
+    return Dots(grid.on_photograph()[which], row - row.min(), column - column.min())
 
 
-def _at_working_size(image: Image) -> tuple[Image, float]:
-    """The image with its longer side at WORKING_SIZE, and by how much it was scaled."""
-    height, width = image.shape[:2]
-    scale = WORKING_SIZE / max(width, height)
-    if scale == 1.0:
-        return image, 1.0
-    way = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    return np.asarray(cv2.resize(image, None, fx=scale, fy=scale, interpolation=way), np.uint8), scale
+def _too_few(grid: DotGrid | None) -> str:
+    if grid is None:
+        return "the image is too small to hold dots in a grid"
+    count = 0 if grid.lattice is None else len(grid.lattice)
+    return f"{len(grid.spots)} bright spots, {count} of them in a grid"
 
 
-def _shade(around: Image, uv: Array) -> Array:
-    height, width = around.shape[:2]
-    at = np.rint(uv).astype(int).reshape(-1, 2)
-    return np.asarray(around[at[:, 1].clip(0, height - 1), at[:, 0].clip(0, width - 1)], float)
+def _outline(clean: Image, dots: Array, absent: Array) -> Found:
+    """Edges and end of the blade that carries dots (n, 2); absent (m, 2): where one is missing; image frame."""
+    smooth, size = smoothed(clean), (clean.shape[1], clean.shape[0])
+    texture = texture_between(smooth, dots + (np.array(size) - 1) / 2)
+    blade = Blade(dots, absent, texture, strays=max(Blade.strays, STRAYS / len(dots)), grid_known=False)
+    found = find_edges(clean, smooth, blade, None)
+    noise = sensor_noise(clean)
+    lines, _ = hough_lines(edge_pixels(clean, noise), MOST_LINES, size)
+    return with_cut_end(found, weigh(lines, blade, smooth, noise, None), blade, size)
 
 
-def _left_first(edges: tuple[Side, ...], axis: float) -> list[Side]:
+def _left_first(edges: tuple[Candidate, ...], axis: float) -> list[Candidate]:
     left = np.array([np.sin(axis), -np.cos(axis)])
     return sorted(edges, key=lambda edge: -float(edge.outward @ left))
