@@ -17,5 +17,9 @@ class Location:
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}" if self.line else self.file
 
+    def seen_from(self, file: str) -> str:
+        """`line 3` in that file, `other.yaml:3` elsewhere."""
+        return f"line {self.line}" if self.file == file else f"{self.file}:{self.line}"
+
 
 NOWHERE = Location("", 0, 0)

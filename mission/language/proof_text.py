@@ -69,9 +69,7 @@ def _where(edge: Edge, file: str) -> str:
     asked = [f"when {edge.transition.when}"] if edge.transition.when is not None else []
     asked += [f"unless {edge.transition.unless}"] if edge.transition.unless is not None else []
     via = f", as {edge.transition.event}" if edge.transition.event != edge.event else ""
-    place = edge.transition.location
-    line = f"line {place.line}" if place.file == file else f"{place.file}:{place.line}"
-    return f"   [{line}{via}{'; ' if asked else ''}{' '.join(asked)}]"
+    return f"   [{edge.transition.location.seen_from(file)}{via}{'; ' if asked else ''}{' '.join(asked)}]"
 
 
 def data(proof: Proof) -> dict[str, Any]:

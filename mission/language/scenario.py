@@ -11,6 +11,7 @@ from mission.language.diagnostics import Diagnostic
 from mission.language.document import Mission
 from mission.language.location import Location
 from mission.language.simulation import Simulation, SimulationError
+from mission.language.sources import shown
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class ScenarioFile:
             tuple(path for path in states if path not in entered),
             tuple(
                 f"{transition.source or 'the mission'}: {transition.event} → {transition.target}"
-                f" (line {transition.location.line})"
+                f" ({transition.location.seen_from(shown(self.mission.path))})"
                 for transition in wanted
                 if transition.key not in taken
             ),

@@ -15,9 +15,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from mission.behaviours.behaviour import behaviours
 from mission.executive.events import EVENTS, outcomes
 from mission.language.diagnostics import Diagnostic, near_or_choices
-from mission.language.document import Mission
+from mission.language.document import OUTCOMES, Mission
 from mission.language.loading import examine
 from mission.language.location import Location
 from mission.language.quantities import keys
@@ -73,6 +74,9 @@ class _Reader:
         coverage = table.get("coverage")
         if coverage is not None and (not isinstance(coverage, Scalar) or coverage.value != "complete"):
             self.report(coverage.location, f"coverage can be asked to be complete, not {kind(coverage)}")
+        if mission is not None:
+            for step in (step for scenario in scenarios for step in scenario.steps):
+                self.names(step, mission)
         if mission is None or self.problems:
             return None, tuple(self.problems)
         untaken = tuple(text for text, _ in self.texts(table, "allow_untaken"))
@@ -172,6 +176,25 @@ class _Reader:
                 self.report(places["given"], f"there is no quantity {name!r}", near_or_choices(name, keys()))
             elif value is not None and not (isinstance(value, int | float) and abs(value) < float("inf")):
                 self.report(places["given"], f"{name} is a number, true, false or null, not {value!r}")
+
+    def names(self, step: ScenarioStep, mission: Mission) -> None:
+        """Whether the mission has what the step speaks of; expecting what does not exist can only fail."""
+        fields = step.fields
+        for key in ("at", "within", "state", "states"):
+            value = fields.get(key, [])
+            for name in value if isinstance(value, list) else [value]:
+                if name not in mission.states:
+                    self.report(step.places[key], f"there is no state {name!r}", near_or_choices(name, mission.states))
+        does = fields.get("does")
+        behaviour = behaviours().get(does) if does is not None else None
+        if does is not None and behaviour is None:
+            self.report(step.places["does"], f"there is no behaviour {does!r}", near_or_choices(does, behaviours()))
+        if (outcome := fields.get("outcome")) is not None and outcome not in OUTCOMES:
+            self.report(step.places["outcome"], f"no mission ends {outcome!r}", near_or_choices(outcome, OUTCOMES))
+        if behaviour is not None:
+            known = behaviour.parameters.model_fields
+            for name in (name for name in fields.get("with", {}) if name not in known):
+                self.report(step.places["with"], f"{does} has no parameter {name!r}", near_or_choices(name, known))
 
     def report(self, place: Location, message: str, hint: str = "") -> None:
         self.problems.append(Diagnostic(place, "M501", message, hint))

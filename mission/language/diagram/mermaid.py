@@ -12,7 +12,8 @@ _ARROWS: dict[Kind, str] = {"way": "==>", "outcome": "-->", "safety": "-->", "op
 
 
 def mermaid(mission: Mission) -> str:
-    """A flowchart: composites as subgraphs, the way to completion thick, safety red, the operator's ways dotted."""
+    """A flowchart: composites as subgraphs, what is entered first marked, the way to completion
+    thick, safety red, the operator's ways dotted."""
     lines = ["flowchart TD", '  start((" "))']
     for path, state in mission.states.items():
         if state.parent is None:
@@ -33,13 +34,15 @@ def mermaid(mission: Mission) -> str:
 
 def _state(mission: Mission, path: str, indent: str) -> Iterator[str]:
     state = mission.states[path]
+    first = state.parent is not None and mission.states[state.parent].initial == path
+    name = f"▸ {state.name}" if first else state.name
     if state.children:
-        yield f'{indent}subgraph {_id(path)}["{_text(state.name)}"]'
+        yield f'{indent}subgraph {_id(path)}["{_text(name)}"]'
         for child in state.children:
             yield from _state(mission, child, indent + "  ")
         yield f"{indent}end"
         return
-    text = "<br/>".join(_text(part) for part in (state.name, details(mission, path)) if part)
+    text = "<br/>".join(_text(part) for part in (name, details(mission, path)) if part)
     yield f'{indent}{_id(path)}(["{text}"])' if state.final else f'{indent}{_id(path)}["{text}"]'
 
 

@@ -43,7 +43,7 @@ def test_a_good_scenario_passes_and_its_coverage_is_counted(tmp_path: Path) -> N
     ("before", "after", "word"),
     [
         ("passed: launch", "passed: work", "state is 'launch', not 'work'"),
-        ("does: hold", "does: land", "does is 'hold'"),
+        ("does: hold, with: {for_s: 5}", "does: land", "does is 'hold'"),
         ("for_s: 5", "for_s: 6", "for_s"),
         ("wait_s: 60.5", "wait_s: 59.5", "state is 'work'"),
         ("ignored: true", "ignored: false", "ignored is True"),
@@ -73,6 +73,12 @@ def test_what_does_not_go_as_expected_fails_at_its_line(tmp_path: Path, before: 
         ("wait_s: 60.5", "given: {battery_percent: .nan}"),
         ("passed: launch", "passed launch"),
         ("ignored: true", "ignored: maybe"),
+        ("passed: launch", "passed: launhc"),
+        ("state: work, does", "state: wrok, does"),
+        ("does: hold", "does: hodl"),
+        ("for_s: 5", "fro_s: 5"),
+        ("states: [aborted]", "states: [abroted]"),
+        ("outcome: aborted", "outcome: abroted"),
         ("scenarios:", "scenarois:"),
     ],
 )
