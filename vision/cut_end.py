@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.candidates import LEAST_RUN, Candidate
-from vision.closing import ALONE, CLEAR, WORTH, evidence_of
+from vision.closing import ALONE, WORTH, evidence_of
 from vision.edge_fit import trimmed
 from vision.edges import Found
 from vision.ending import HOLE, SEEN, UNSEEN, Ending, side_of
@@ -23,6 +23,7 @@ LARGEST_TAPER = np.deg2rad(34)  # of a blade toward its end
 ASKEW = np.deg2rad(35)  # from square to the axis, of the line that cuts it off
 PAST_PX = 48.0  # past a corner, over which a step must not go on
 ROUND = 0.35  # of the width: a corner may be rounded over as much of each side
+CLEAR = 5.0  # evidence by which a blade that is cut off must be likelier than what was found
 LEAST_WORTH = -1.2
 LEAST_SUPPORT = 0.3
 AHEAD_PX = 45.0  # so far before a cut the blade's last dots lie, at most

@@ -58,7 +58,7 @@ def find_dot_grid(image: Image) -> DotGrid | None:
     """The dots of an image (h, w) or (h, w, 3); None of one that is too small to hold any."""
     best: DotGrid | None = None
     for size in SIZES:
-        scale = size / max(image.shape[:2])
+        scale = size / max(*image.shape[:2], 1)
         if scale > MOST_ENLARGED or scale * min(image.shape[:2]) < LEAST_SIDE:
             continue
         found = _at_size(resized(image, scale), scale)

@@ -139,36 +139,6 @@ def onward(uv: Array, lattice: Lattice) -> Array:
     return np.array(found).reshape(-1, 2)
 
 
-def outer(lattice: Lattice) -> NDArray[np.bool_]:
-    """Which of the lattice's dots (n,) have no dot on one of their four sides."""
-    at = set(zip(lattice.row.tolist(), lattice.column.tolist(), strict=True))
-    return np.array(
-        [
-            any((r + dr, c + dc) not in at for dr, dc in ROUND_ABOUT)
-            for r, c in zip(lattice.row.tolist(), lattice.column.tolist(), strict=True)
-        ]
-    )
-
-
-def missing(uv: Array, lattice: Lattice) -> Array:
-    """Where the laser throws dots for certain, (m, 2) px, if there is anything to throw them on: in every row and
-    column that has dots, but shows none there. uv (n, 2): the spots."""
-    at = {(int(r), int(c)): uv[m] for r, c, m in zip(lattice.row, lattice.column, lattice.member, strict=True)}
-    rows, columns = int(lattice.row.max()) + 1, int(lattice.column.max()) + 1
-    free = [(r, c) for r in range(rows) for c in range(columns) if (r, c) not in at]
-    places, found = np.array(list(at)), []
-    where = np.array(list(at.values()))
-    for place in free:
-        # A plane through the nearest nine: it may lead far, where a curve would lead astray.
-        here = places - place
-        near = np.argsort(here[:, 0] ** 2 + here[:, 1] ** 2, kind="stable")[:9]
-        design = np.column_stack([np.ones(len(near)), here[near, 1], here[near, 0]])
-        held = np.diag([0.0, 1.0, 1.0])
-        known = np.vstack([np.zeros(2), lattice.steps])
-        found.append(np.linalg.solve(design.T @ design + held, design.T @ where[near] + held @ known)[0])
-    return np.array(found).reshape(-1, 2)
-
-
 def _table(at: dict[Place, int], steps: Array) -> tuple[NDArray[np.int32], Array, Place]:
     """Places as a table, the steps at each, and what is added to a place to find it there."""
     places = np.array(list(at))

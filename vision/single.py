@@ -14,7 +14,7 @@ from vision.cut_end import with_cut_end
 from vision.dot_grid import DotGrid, find_dot_grid, resized
 from vision.edges import Found, edge_of, find_edges
 from vision.evidence import Blade, texture_between
-from vision.lattice import missing
+from vision.laser_fan import Fan, fan_of, middle_place
 from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
@@ -29,6 +29,9 @@ SPACING = 32.0  # px between dots, to which an image is brought before edges are
 MOST_OFF = 1.25  # times: what need not be brought to it
 STRAYS = 2.2  # dots that may lie beyond an edge all the same: on a string, say, or on what is behind the blade
 BEYOND_PX = 6.0  # a dot's middle may lie so far beyond an edge
+WITHIN_PX = 5.0  # so far within an edge a dot would be seen
+BORDER_PX = 6.0  # of the image, within which it may not
+MOST_MISSING = 0.2  # share of the dots within the edges, beyond which they are not believed
 MOST_LINES = 220
 COLOURLESS = 1.5  # grey levels by which colours differ on average in a grey image
 
@@ -50,11 +53,11 @@ def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = Non
         factor = 1.0
     clean = resized(clean, factor).reshape(round(clean.shape[0] * factor), -1, clean.shape[2])
     centre = (np.array(clean.shape[1::-1]) - 1) / 2
-    dots, absent = (
-        (uv + 0.5) * factor - 0.5 - centre for uv in (grid.spots.uv[lattice.member], missing(grid.spots.uv, lattice))
-    )
-    absent = absent[(np.abs(absent) < centre - 6).all(axis=1)]
-    found = _outline(clean, dots, absent)
+    fan = fan_of(grid.spots.uv, lattice)
+    dots, places = ((uv + 0.5) * factor - 0.5 - centre for uv in (grid.spots.uv[lattice.member], fan.uv))
+    in_view = np.asarray((np.abs(places) < centre - BORDER_PX).all(axis=1), np.bool_)
+    middle = middle_place(grid.spots.uv, lattice, (np.array(grid.image.shape[1::-1]) - 1) / 2)
+    found = _outline(clean, dots, places, fan, in_view, middle)
     watch.lap("edges")
     edges, axis, to_photograph = found.edges, found.axis, 1 / (factor * grid.scale)
     return BladeObservation(
@@ -122,15 +125,38 @@ def _too_few(grid: DotGrid | None) -> str:
     return f"{len(grid.spots)} bright spots, {count} of them in a grid"
 
 
-def _outline(clean: Image, dots: Array, absent: Array) -> Found:
-    """Edges and end of the blade that carries dots (n, 2); absent (m, 2): where one is missing; image frame."""
+def _outline(clean: Image, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_], middle: Array) -> Found:
+    """Edges and end of the blade that carries dots (n, 2); places (m, 2): where the fan has none; image frame."""
     smooth, size = smoothed(clean), (clean.shape[1], clean.shape[0])
     texture = texture_between(smooth, dots + (np.array(size) - 1) / 2)
-    blade = Blade(dots, absent, texture, strays=max(Blade.strays, STRAYS / len(dots)), grid_known=False)
-    found = find_edges(clean, smooth, blade, None)
-    noise = sensor_noise(clean)
-    lines, _ = hough_lines(edge_pixels(clean, noise), MOST_LINES, size)
-    return with_cut_end(found, weigh(lines, blade, smooth, noise, None), blade, size)
+    strays = max(Blade.strays, STRAYS / len(dots))
+    lines, _ = hough_lines(edge_pixels(clean, sensor_noise(clean)), MOST_LINES, size)
+    refused = None
+    for absent in (fan.central(middle), fan.certain()):
+        blade = Blade(dots, places[absent & in_view], texture, strays=strays, grid_known=False)
+        found = find_edges(clean, smooth, blade, None)
+        found = with_cut_end(found, weigh(lines, blade, smooth, sensor_noise(clean), None), blade, size)
+        missing = _share_missing(found, dots, places, fan, in_view)
+        if found.edges and missing < MOST_MISSING:
+            return found
+        if found.edges:
+            found = Found(
+                (), found.axis, None, (f"no edge: {missing:.0%} of the dots within the likeliest ones are missing",)
+            )
+        refused = refused or found
+    assert refused is not None
+    return refused
+
+
+def _share_missing(found: Found, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_]) -> float:
+    """Share of missing dots among all that lie within edges and end."""
+    inside = in_view.copy()
+    for edge in found.edges:
+        inside &= places @ edge.outward < edge.rho - WITHIN_PX
+    if found.ending is not None:
+        inside &= places @ found.ending.toward < found.ending.shoulder
+    count = fan.least_missing(inside)
+    return count / (count + len(dots))
 
 
 def _left_first(edges: tuple[Candidate, ...], axis: float) -> list[Candidate]:
