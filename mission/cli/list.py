@@ -1,4 +1,4 @@
-"""List what missions are made of: behaviours, events, conditions, monitors, codes."""
+"""List what missions are made of: behaviours, events, conditions, invariants, monitors, limits, codes."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ class Subject(StrEnum):
     BEHAVIOURS = "behaviours"
     EVENTS = "events"
     CONDITIONS = "conditions"
+    INVARIANTS = "invariants"
     MONITORS = "monitors"
     CODES = "codes"
     LIMITS = "limits"

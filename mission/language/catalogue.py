@@ -26,7 +26,7 @@ class Word:
 
 
 def catalogue(what: str) -> tuple[Word, ...]:
-    """All words of one sort: behaviours, events, conditions, monitors, limits or codes."""
+    """All words of one sort: behaviours, events, conditions, invariants, monitors, limits or codes."""
     return tuple(_SORTS[what]())
 
 
@@ -56,14 +56,18 @@ def _behaviours() -> Iterable[Word]:
 
 
 def _events() -> Iterable[Word]:
+    from mission.behaviours.behaviour import behaviours
     from mission.executive.events import EVENTS, outcomes
 
     for event in EVENTS.values():
         falls = f"falls back to {event.falls_back_to}" if event.falls_back_to else ""
         facts = (str(event.severity), f"raised by {event.raised_by}", falls)
         yield Word(event.name, event.text, tuple(fact for fact in facts if fact))
-    for name, event in sorted(outcomes().items()):
-        yield Word(name, event.text, ("outcome of a behaviour",))
+    for name in sorted(outcomes()):
+        ends = [(one.name, "", one.outcomes[name]) for one in behaviours().values() if name in one.outcomes]
+        yield Word(
+            name, f"how {', '.join(one for one, _, _ in ends)} can end", ("outcome of a behaviour",), tuple(ends)
+        )
 
 
 def _conditions() -> Iterable[Word]:
@@ -75,6 +79,18 @@ def _conditions() -> Iterable[Word]:
             yield Word(quantity.name, quantity.text, asked or ("yes or no",))
         else:
             yield Word(quantity.name, quantity.text, (f"{quantity.low:g} to {quantity.high:g} {quantity.unit}",))
+
+
+def _invariants() -> Iterable[Word]:
+    from mission.language.invariants import KINDS, Invariant, vocabulary
+
+    meanings = " ".join((Invariant.__doc__ or "").split())
+    for kind in KINDS:
+        meaning = meanings.partition(f"{kind}: ")[2].partition(". ")[0]
+        yield Word(kind, meaning.rstrip(".") + ".", ("a statement, or a list of them",))
+    for quantity in vocabulary(("STATE",)).values():
+        asked = tuple(f"{quantity.name}({argument})" for argument in quantity.arguments)
+        yield Word(quantity.name, quantity.text, asked or ("yes or no",))
 
 
 def _monitors() -> Iterable[Word]:
@@ -135,6 +151,7 @@ _SORTS: Mapping[str, Callable[[], Iterable[Word]]] = {
     "behaviours": _behaviours,
     "events": _events,
     "conditions": _conditions,
+    "invariants": _invariants,
     "monitors": _monitors,
     "limits": _limits,
     "codes": _codes,

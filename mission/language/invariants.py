@@ -31,7 +31,7 @@ FLAGS = (
     Quantity("airborne", "", "the vehicle may be in the air"),
     Quantity("armed", "", "the motors may be running; as airborne, and while taking off and landing"),
     Quantity("laser_on", "", "the behaviour that runs lights the laser"),
-    Quantity("recording", "", "the behaviour that runs records frames"),
+    Quantity("recording", "", "the behaviour that runs records the blade's side; single photographs do not count"),
     Quantity("needs_vision", "", "the behaviour that runs needs images"),
     Quantity("ended", "", "the mission has ended"),
 )

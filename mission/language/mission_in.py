@@ -42,6 +42,7 @@ FIELDS = {
     "always_eventually": "statements that must become true again, proven by mission prove",
 }
 _REQUIRED = ("mission", "version", "turbine", "rig", "site", "initial", "states")
+_IN_FILES = ("turbine", "rig", "site")
 _WORLDLESS = ("hardware", "recorded")
 
 
@@ -110,7 +111,17 @@ def _section(model: type[Any], root: Table, key: str, problems: list[Diagnostic]
     node = root.get(key)
     if node is None or (isinstance(node, Table) and not node.entries and _blamed(node.location, problems)):
         return None
-    return typed(model, node, _section_place(root, key, node), key, problems)
+    place = _section_place(root, key, node)
+    found: list[Diagnostic] = []
+    section = typed(model, node, place, key, found)
+    missing = [finding for finding in found if finding.code == "M201" and finding.location == place]
+    if missing and key in _IN_FILES and place == root.key_location(key):
+        # Whoever gives a few values means to change those of the file that was named before.
+        names = ", ".join(finding.message.split("'")[1] for finding in missing)
+        message, hint = f"{key} needs {names}", f"as in {key}: {{extends: FILE, …}}, to change values of a file"
+        found = [Diagnostic(place, "M201", message, hint), *(one for one in found if one not in missing)]
+    problems.extend(found)
+    return section
 
 
 def _section_place(root: Table, key: str, node: Node) -> Location:

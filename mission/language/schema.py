@@ -44,7 +44,10 @@ def schema() -> dict[str, Any]:
     turbine, rig, site = (_model(model, definitions) for model in (TurbineFile, RigFile, SiteFile))
     world, limits = _model(WorldSettings, definitions), _model(Limits, definitions)
     rig["properties"]["world"] = world
-    events = {name: event.text for name, event in {**EVENTS, **outcomes()}.items()}
+    events = {name: event.text for name, event in EVENTS.items()}
+    for name in outcomes():
+        ends = [f"{one.name}: {one.outcomes[name]}" for one in behaviours().values() if name in one.outcomes]
+        events[name] = "; ".join(ends)
     condition = {
         "type": "string",
         "description": "A condition over: " + ", ".join(QUANTITIES),

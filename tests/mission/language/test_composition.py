@@ -76,6 +76,15 @@ def test_a_slip_of_the_pen_is_understood(tmp_path: Path, before: str, after: str
     assert any(remedy in finding.hint for finding in examined(tmp_path, SMALL.replace(before, after)).errors)
 
 
+def test_single_values_of_a_named_file_are_changed_by_extending_it(tmp_path: Path) -> None:
+    written(tmp_path, SMALL, "base.yaml")
+    over = "extends: base.yaml\nmission: other\nturbine: {azimuth_deg: 90}\n"
+    finding = only(examine(written(tmp_path, over, "other.yaml")))
+    assert finding.location.line == 3 and "turbine: {extends: FILE" in finding.hint
+    right = over.replace("{azimuth", "{extends: turbines/v80.yaml, azimuth")
+    assert load(written(tmp_path, right, "other.yaml")).turbine.azimuth_deg == 90
+
+
 def test_a_misspelt_state_of_the_file_below_is_told_by_its_neighbour(tmp_path: Path) -> None:
     written(tmp_path, SMALL, "base.yaml")
     text = "extends: base.yaml\nmission: other\nstates: {wrok: {with: {for_s: 9}}}\n"
