@@ -30,10 +30,12 @@ def test(
     from mission.cli.errors import CommandError
     from mission.language.scenario_report import data, find, report, shown
 
-    paths = [path for file in files for path in find(file)]
-    if not paths:
-        raise CommandError(f"test: no scenarios for {', '.join(str(file) for file in files)}; write NAME.scenario.yaml")
-    reports = [report(path) for path in paths]
+    found = {file: find(file) for file in files}
+    if gone := [str(file) for file in files if not file.exists()]:
+        raise CommandError(f"test: there is no {', '.join(gone)}")
+    if without := [str(file) for file, paths in found.items() if not paths]:
+        raise CommandError(f"test: no scenarios for {', '.join(without)}; write NAME.scenario.yaml")
+    reports = [report(path) for path in dict.fromkeys(path for paths in found.values() for path in paths)]
     if as_json:
         import json
 

@@ -123,3 +123,14 @@ def test_pytest_collects_scenario_files_by_their_name(pytester: pytest.Pytester,
     outcome = pytester.runpytest_inprocess("-p", "no:cacheprovider", "-p", "no:xdist", str(tmp_path / "missions"))
     outcome.assert_outcomes(failed=2)
     outcome.stdout.fnmatch_lines(["*small.scenario.yaml:10:*M502*outcome is 'aborted'*", "*M503*left out*"])
+
+
+def test_what_cannot_be_tested_is_said_also_beside_what_passes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reported(tmp_path, GOOD)
+    good = str(tmp_path / "missions" / "small.yaml")
+    written(tmp_path, SMALL, "untested.yaml")
+    for name, word in (("gone.yaml", "there is no"), ("untested.yaml", "no scenarios for")):
+        assert main(["test", good, str(tmp_path / "missions" / name)]) == 2
+        assert word in capsys.readouterr().err
