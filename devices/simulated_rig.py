@@ -23,7 +23,7 @@ class SimulatedRig:
 
     true_pose: where the vehicle truly is now. now: the executive's clock, which stamps the frames unless the pose
     brings its own stamp. mount (3,) m: the left lens in body axes. Two rigs with one seed, asked for the same poses in
-    the same order, deliver the same bytes."""
+    the same order, deliver the same bytes. rehearse: draw once now, not for the first time in flight."""
 
     simulated = True
 
@@ -34,6 +34,8 @@ class SimulatedRig:
         mount: Array,
         true_pose: Callable[[], Carrier],
         now: Callable[[], float],
+        *,
+        rehearse: bool = True,
     ) -> None:
         self.world = world
         self.geometry = geometry
@@ -43,7 +45,8 @@ class SimulatedRig:
         self._laser_armed = True
         self._count = 0
         self._lock = threading.Lock()
-        self._rehearse()
+        if rehearse:
+            self._rehearse()
 
     def capture(self, laser: bool = True) -> StereoFrames:
         """One set of frames; see `devices.rig.Rig.capture` and the fault switches of the world."""

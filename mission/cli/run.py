@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from mission.record.folder import RunFolder
 
 
-FRAMING = ("follow_edge", "climb_tower")
-"""Behaviours that leave pictures in the record."""
-
-
 class Autonomy(StrEnum):
     """How much is asked before a transition is taken."""
 
@@ -140,6 +136,8 @@ def _may_fly(mission: Mission, *, speed: float | None, lockstep: bool, system: s
 
 
 def _takes_frames(mission: Mission) -> bool:
+    from mission.executive.ready import FRAMING
+
     return any(state.do in FRAMING for state in mission.states.values())
 
 

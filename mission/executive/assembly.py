@@ -5,15 +5,14 @@ from __future__ import annotations
 import asyncio
 import gc
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mission.executive.belief import located, surveyed_turbine
 from mission.executive.knowledge import Keeping, Knowledge, go_on_from, read_knowledge
-from mission.executive.ready import make_ready
+from mission.executive.options import FlightOptions, FlightResult
+from mission.executive.ready import make_ready, takes_images
 from mission.executive.resume import Interrupted, last_of, restore, where
 from mission.executive.signals import interrupting
 from mission.executive.simulation import Rehearsal
@@ -21,48 +20,14 @@ from mission.executive.stage import FlightError, Stage, lockstep_stage, wall_sta
 
 if TYPE_CHECKING:
     from flight.turbine import Turbine
-    from mission.executive.decision import Autonomy
     from mission.executive.executive import Executive
     from mission.executive.journal import Journal
-    from mission.language.document import Mission
-    from mission.record.folder import RunFolder
     from mission.record.recorder import RunRecorder
 
 __all__ = ["FlightError", "FlightOptions", "FlightResult", "fly"]
 
 CONNECT_S = 20.0
 SIMULATED_LATENCY_S = 0.06  # of capture and vision, in lockstep time, where computing takes no time at all
-
-
-@dataclass(frozen=True)
-class FlightOptions:
-    """What `mission run` was asked to do, checked and typed.
-
-    speed, system: None for the rig file's. must_confirm: whether a person is asked before the vehicle is armed, as
-    `connection.must_confirm` decides. confirm: how, also before marked transitions with autonomy below full.
-    on_start: called with the executive once it exists, for the live view. resume: the
-    folder of an interrupted run to go on with.
-    """
-
-    mission: Mission
-    folder: RunFolder
-    speed: float | None = None
-    lockstep: bool = False
-    system: str | None = None
-    must_confirm: bool = True
-    autonomy: Autonomy = "full"
-    confirm: Callable[[str], bool] = lambda question: False
-    on_start: Callable[[Executive], None] = lambda executive: None
-    resume: Path | None = None
-
-
-@dataclass(frozen=True)
-class FlightResult:
-    """How the flight ended: the final state's outcome, its path, and whether a person or a signal interrupted it."""
-
-    outcome: str
-    final_state: str
-    interrupted: bool
 
 
 def fly(options: FlightOptions) -> FlightResult:
@@ -112,9 +77,10 @@ async def _fly(
                 return FlightResult("refused", options.mission.initial, False)
             for name, value in stage.parameters.items():
                 await stage.autopilot.set_parameter(name, value)
-            if options.lockstep:
+            looks = takes_images(options.mission)
+            if looks and options.lockstep:
                 make_ready(stage.world, stage.rig.geometry)
-            else:
+            elif looks:
                 await asyncio.to_thread(make_ready, stage.world, stage.rig.geometry)
         except AutopilotError as error:
             raise FlightError(str(error)) from error

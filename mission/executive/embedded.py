@@ -9,7 +9,7 @@ from mission.executive.stage import FlightError
 if TYPE_CHECKING:
     from devices.vehicle.handover import RunningVehicle, VehicleNote
     from devices.vehicle.spawn import VehicleProcess
-    from mission.executive.assembly import FlightOptions
+    from mission.executive.options import FlightOptions
 
 
 def embedded_vehicle(options: FlightOptions, speed: float) -> RunningVehicle:

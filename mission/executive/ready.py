@@ -11,7 +11,20 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from devices.world.world import World
+    from mission.language.document import Mission
     from vision.camera import RigGeometry
+
+
+FRAMING = ("follow_edge", "climb_tower")
+"""Behaviours that leave pictures in the record."""
+
+
+def takes_images(mission: Mission) -> bool:
+    """Whether any state of the mission looks through the cameras."""
+    from mission.behaviours.behaviour import behaviours
+
+    done = [state.do for state in mission.states.values() if state.do is not None]
+    return any(name in FRAMING or behaviours()[name].needs_vision for name in done)
 
 
 def make_ready(world: World | None, geometry: RigGeometry) -> None:

@@ -22,6 +22,7 @@ from mission.executive.connection import (
     speed_mismatch,
     system_of,
 )
+from mission.executive.ready import takes_images
 from mission.executive.simulation import Switch, build_world
 
 if TYPE_CHECKING:
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
     from devices.vehicle.handover import RunningVehicle
     from devices.world.world import World
     from flight.autopilot import Autopilot
-    from mission.executive.assembly import FlightOptions
     from mission.executive.clock import Clock
+    from mission.executive.options import FlightOptions
     from mission.executive.pace import Pace
     from vision.camera import RigGeometry
 
@@ -78,7 +79,8 @@ def lockstep_stage(options: FlightOptions, start_s: float = 0.0) -> Iterator[Sta
         truth = vehicle.pose()
         return TruePose(truth.position, truth.attitude, truth.gimbal, truth.velocity)
 
-    rig = SimulatedRig(world, _geometry(options), np.array(mission.rig.mount_m), true_pose, clock.now)
+    mount, looks = np.array(mission.rig.mount_m), takes_images(mission)
+    rig = SimulatedRig(world, _geometry(options), mount, true_pose, clock.now, rehearse=looks)
     switches = FaultSwitches(vehicle, [autopilot])
 
     def switch(name: str, **arguments: object) -> None:
@@ -181,7 +183,8 @@ def _rig(
             truth = client.pose()
             return TruePose(truth.position, truth.attitude, truth.gimbal, truth.velocity)
 
-        return SimulatedRig(world, _geometry(options), mount, true_pose, clock.now), client.command
+        looks = takes_images(mission)
+        return SimulatedRig(world, _geometry(options), mount, true_pose, clock.now, rehearse=looks), client.command
     if world is not None:
 
         def reported_pose() -> TruePose:

@@ -20,6 +20,7 @@ SHORT_BLADE = (
     "turbine.max_chord_m=1.7",
     "turbine.root_diameter_m=0.9",
     "turbine.hub_height_m=30",
+    "site.turbine_north_m=40",
 )
 
 

@@ -24,8 +24,6 @@ from mission.language.document import load
 from mission.record.folder import create
 from tests.mission.test_flights import ROOT, SHORT_BLADE, SQUARE, command, journal, vehicle_events, wait_for
 
-NEAR = ("site.turbine_north_m=40",)
-
 
 @pytest.fixture
 def logs(tmp_path: Path) -> Iterator[Path]:
@@ -116,7 +114,7 @@ def test_after_a_power_failure_it_begins_on_the_ground_with_a_torn_journal(logs:
 def half_flown(logs: Path) -> None:
     """The folder of a run that was cut off on its way back along the trailing side, six metres and a half from the
     hub."""
-    run = create(logs, "v80_blade", load("missions/v80_blade.yaml", [*SHORT_BLADE, *NEAR]).resolved_yaml)
+    run = create(logs, "v80_blade", load("missions/v80_blade.yaml", SHORT_BLADE).resolved_yaml)
     memory = Memory(
         home=(0.0, 0.0, 0.0),
         azimuth=math.radians(45.0),
