@@ -19,8 +19,9 @@ from vision.evidence import Blade
 Array = NDArray[Any]  # of floats
 
 MOST = 12  # candidates that are tried
-LARGEST_TAPER = np.deg2rad(34)  # of a blade toward its end
+LARGEST_TAPER = np.deg2rad(42)  # of a blade toward its end
 ASKEW = np.deg2rad(35)  # from square to the axis, of the line that cuts it off
+ASKEW_ALONE = np.deg2rad(20)  # the same where only one edge is seen
 PAST_PX = 48.0  # past a corner, over which a step must not go on
 ROUND = 0.35  # of the width: a corner may be rounded over as much of each side
 CLEAR = 5.0  # evidence by which a blade that is cut off must be likelier than what was found
@@ -33,9 +34,10 @@ BORDER = 8.0  # px: a corner nearer to the image border than this is not seen
 
 @dataclass(frozen=True)
 class Cut:
-    """A blade that ends: the candidates along it, the one across it, and what speaks for it all."""
+    """A blade that ends: the one or two candidates along it, the one across it, where that begins and ends, and what
+    speaks for it all."""
 
-    edges: tuple[Candidate, Candidate]
+    edges: tuple[Candidate, ...]
     across: Candidate
     corners: tuple[Array, Array]
     toward: Array
@@ -47,7 +49,8 @@ def with_cut_end(found: Found, candidates: list[Candidate], blade: Blade, size: 
 
     size: (width, height) of the working image."""
     cut = _likeliest(candidates[:MOST], blade, (np.array(size) - 1) / 2)
-    if cut is None or cut.evidence < max(_evidence_of(found, blade), 0.0) + CLEAR:
+    least = max(_evidence_of(found, blade), 0.0) + (CLEAR if found.edges else 0.0)
+    if cut is None or cut.evidence < least:
         return found
     one, two = cut.corners
     middle = (one + two) / 2
@@ -75,32 +78,38 @@ def _evidence_of(found: Found, blade: Blade) -> float:
 def _likeliest(candidates: list[Candidate], blade: Blade, half: Array) -> Cut | None:
     best: Cut | None = None
     usable = [c for c in candidates if c.worth > LEAST_WORTH and c.support > LEAST_SUPPORT]
-    for a, one in enumerate(usable):
-        for two in usable[a + 1 :]:
-            if float(-one.outward @ two.outward) < np.cos(LARGEST_TAPER):
+    pairs: list[tuple[Candidate, ...]] = [(one,) for one in usable]
+    pairs += [
+        (one, two)
+        for a, one in enumerate(usable)
+        for two in usable[a + 1 :]
+        if float(-one.outward @ two.outward) > np.cos(LARGEST_TAPER)
+    ]
+    for edges in pairs:
+        way = edges[0].outward - (edges[1].outward if len(edges) == 2 else -edges[0].outward)
+        way = np.array([-way[1], way[0]]) / np.linalg.norm(way)
+        for across in usable:
+            lean = float(across.outward @ way)
+            if across in edges or abs(lean) < np.cos(ASKEW if len(edges) == 2 else ASKEW_ALONE):
                 continue
-            way = one.outward - two.outward
-            way = np.array([-way[1], way[0]]) / np.linalg.norm(way)
-            for across in usable:
-                lean = float(across.outward @ way)
-                if across is one or across is two or abs(lean) < np.cos(ASKEW):
-                    continue
-                cut = _cut(one, two, across, np.sign(lean) * way, blade, half)
-                if cut is not None and (best is None or cut.evidence > best.evidence):
-                    best = cut
+            cut = _cut(edges, across, np.sign(lean) * way, blade, half)
+            if cut is not None and (best is None or cut.evidence > best.evidence):
+                best = cut
     return best
 
 
-def _cut(one: Candidate, two: Candidate, across: Candidate, toward: Array, blade: Blade, half: Array) -> Cut | None:
-    corners = (_crossing(one, across), _crossing(two, across))
+def _cut(edges: tuple[Candidate, ...], across: Candidate, toward: Array, blade: Blade, half: Array) -> Cut | None:
+    ends = [across.outward * across.rho + end * across.profile.direction[across.index] for end in across.ends]
+    far = _crossing(edges[1], across) if len(edges) == 2 else min(ends, key=lambda end: float(end @ edges[0].outward))
+    corners = (_crossing(edges[0], across), far)
     wide = float(np.hypot(*(corners[0] - corners[1])))
-    if wide < LEAST_RUN or any((np.abs(corner) > half - BORDER).any() for corner in corners):
+    if wide < LEAST_RUN or any((np.abs(corner) > half - BORDER).any() for corner in corners[: len(edges)]):
         return None
     if float((blade.dots @ across.outward).max()) < across.rho - AHEAD_PX:
         return None
     slack = ROUND * wide
-    evidence = WORTH * (one.worth + two.worth + across.worth)
-    for edge, corner in zip((one, two), corners, strict=True):
+    evidence = WORTH * sum(side.worth for side in (*edges, across)) + (ALONE if len(edges) == 1 else 0.0)
+    for edge, corner in zip(edges, corners, strict=False):
         seen = side_of(edge, toward)
         end = float(corner @ toward)
         before, past = seen.stations < end - 4, (seen.stations > end + 6) & (seen.stations < end + PAST_PX)
@@ -115,14 +124,16 @@ def _cut(one: Candidate, two: Candidate, across: Candidate, toward: Array, blade
         ((t < first - 6) & (t > first - PAST_PX)) | ((t > last + 6) & (t < last + PAST_PX)),
     )
     near = between & ((t < first + slack) | (t > last - slack))
+    past &= (t < last) | (len(edges) == 2) | (float((corners[1] - corners[0]) @ direction) < 0)
+    past &= (t > first) | (len(edges) == 2) | (float((corners[1] - corners[0]) @ direction) > 0)
     seen_across = float(_forgiven(tells, near)[between].sum())
     if seen_across < 0:
         return None
     evidence += seen_across - max(float(tells[past].sum()), 0.0)
     if len(blade.absent):
-        inside = np.all([blade.absent @ side.outward < side.rho - DOT_ROOM for side in (one, two, across)], axis=0)
+        inside = np.all([blade.absent @ side.outward < side.rho - DOT_ROOM for side in (*edges, across)], axis=0)
         evidence += HOLE * float(inside.sum())
-    return Cut((one, two), across, corners, toward, evidence)
+    return Cut(edges, across, corners, toward, evidence)
 
 
 def _forgiven(tells: Array, near: NDArray[np.bool_]) -> Array:

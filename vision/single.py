@@ -112,10 +112,11 @@ def _on_blade(dots: Array, found: Found) -> NDArray[np.bool_]:
 
 
 def _dots(grid: DotGrid, which: NDArray[np.bool_]) -> Dots:
-    """Some of the lattice's dots, counted from the first row and column that is seen."""
+    """Some of the lattice's dots, row by row, counted from the first row and column that is seen."""
     assert grid.lattice is not None
     row, column = grid.lattice.row[which], grid.lattice.column[which]
-    return Dots(grid.on_photograph()[which], row - row.min(), column - column.min())
+    order = np.lexsort((column, row))
+    return Dots(grid.on_photograph()[which][order], (row - row.min())[order], (column - column.min())[order])
 
 
 def _too_few(grid: DotGrid | None) -> str:
