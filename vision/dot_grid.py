@@ -17,6 +17,7 @@ from vision.lattice import Lattice, between, find_lattice, grown_on, kept, onwar
 Array = NDArray[Any]  # of floats
 
 SIZES = (612, 306, 153)  # px of the longer side: dots are then 20 to 45 px apart in one of them
+MANY = 24  # dots, of which an image so small that they lie 20 px apart in it holds hardly as many
 MOST_ENLARGED = 2.6
 LEAST_SIDE = 24  # px of the shorter side
 LEAST_SHARE = 0.25  # of its neighbours' height: a dot where the lattice goes on
@@ -58,6 +59,8 @@ def find_dot_grid(image: Image) -> DotGrid | None:
     """The dots of an image (h, w) or (h, w, 3); None of one that is too small to hold any."""
     best: DotGrid | None = None
     for size in SIZES:
+        if size == SIZES[-1] and best is not None and best.lattice is not None and len(best.lattice) >= MANY:
+            break
         scale = size / max(*image.shape[:2], 1)
         if scale > MOST_ENLARGED or scale * min(image.shape[:2]) < LEAST_SIDE:
             continue
