@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mission.language import semantics
@@ -22,9 +22,17 @@ class Remembering:
 
     mission: Mission
     asked: Mapping[str, frozenset[str]]
+    _known: dict[tuple[str, Memory, int], tuple[str, Memory]] = field(default_factory=dict, compare=False)
 
     def after(self, leaf: str, memory: Memory, transition: Transition) -> tuple[str, Memory]:
         """Where a transition leads, and what is remembered there: as the executive would."""
+        asked = (leaf, memory, id(transition))  # many events are answered by one transition
+        found = self._known.get(asked)
+        if found is None:
+            found = self._known[asked] = self._after(leaf, memory, transition)
+        return found
+
+    def _after(self, leaf: str, memory: Memory, transition: Transition) -> tuple[str, Memory]:
         step = semantics.take(self.mission, semantics.Configuration(leaf, dict(memory)), transition)
         kept = (
             (composite, step.after.history[composite])
