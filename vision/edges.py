@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vision.candidates import Candidate, weigh
 from vision.capture import Image
 from vision.closing import contradicted, evidence_of, find_closed, goes_on, opposite, unexplained, with_partner
-from vision.edge_fit import settled, trimmed
+from vision.edge_fit import lens_bend, settled, trimmed
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
 from vision.lines import edge_pixels, hough_lines, sensor_noise
@@ -73,7 +73,8 @@ def find_edges(
         closed = find_closed(candidates, blade, smooth, noise, largest)
     if closed is not None and closed.evidence > evidence_of(chosen, blade):
         ending = closed.ending
-        chosen = tuple(trimmed(edge, ending.toward, ending.shoulder - BEHIND_SHOULDER) for edge in closed.edges)
+        station = ending.shoulder - BEHIND_SHOULDER
+        chosen = tuple(trimmed(edge, ending.toward, station, blade.camera) for edge in closed.edges)
     elif chosen and (missing := unexplained(chosen, blade)) > MOST_MISSING:
         return Found((), axis, None, (f"no edge: {missing:.0%} of the dots within the likeliest ones are missing",))
     elif contradicted(chosen):
@@ -84,10 +85,15 @@ def find_edges(
     if not chosen:
         best = max((c.support for c in candidates), default=0.0)
         return Found((), axis, None, (f"no edge: the best line beside the dots has {best:.0%} support",))
-    chosen = tuple(settled(edge, ending is not None) for edge in chosen)
+    chosen = tuple(settled(edge, ending is not None, _bend_at_focus(edge, blade)) for edge in chosen)
     directions = np.array([np.arctan2(c.outward[1], c.outward[0]) + np.pi / 2 for c in chosen])
     axis = 0.5 * np.angle(np.exp(2j * directions).sum()) % np.pi
     return Found(chosen, float(axis), ending, ())
+
+
+def _bend_at_focus(edge: Candidate, blade: Blade) -> float:
+    place = edge.profile.direction[edge.index] * float(edge.profile.focus[edge.index])
+    return lens_bend(blade.camera, edge.outward * edge.rho + place, edge.outward)
 
 
 def _hides_nothing(one: Candidate, candidates: list[Candidate], blade: Blade) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.camera import StereoPair
+from vision.camera import Camera, StereoPair
 from vision.capture import Image
 from vision.evidence_kernels import line_of_most, longest_runs, median_steps, missing_dots, runs_about
 from vision.lane_kernels import steps_before
@@ -34,7 +34,8 @@ class Blade:
     texture: how strong steps on the blade itself are, between neighbouring dots, in grey levels.
     strays: share of the dots that may lie beyond an edge all the same. grid_known: `absent` rests on the laser's own
     grid.
-    slope (2,): of the surface, change of depth to the right and down; focal: in working px; None where unknown.
+    slope (2,): of the surface, change of depth to the right and down; focal: in working px; camera: that sees it, of
+    the working image; None where unknown.
     """
 
     dots: Array
@@ -44,6 +45,7 @@ class Blade:
     grid_known: bool = True
     slope: Array | None = None
     focal: float = 616.0
+    camera: Camera | None = None
 
     def on_surface(self, point: Array, way: Array) -> Array:
         """Unit vector (3,) on the surface that is seen as `way` (2,) at `point` (2,) of the image."""

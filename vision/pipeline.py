@@ -137,6 +137,7 @@ class Eye:
             texture_between(smooth, seeds),
             slope=surface.slope,
             focal=camera.fx,
+            camera=camera,
         )
         other = None
         if right is not None:
