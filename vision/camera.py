@@ -8,6 +8,7 @@ axes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -46,11 +47,16 @@ class Camera:
         with np.errstate(divide="ignore", invalid="ignore"):
             y, z = points[:, 1] / depth, points[:, 2] / depth
         k1, k2, p1, p2 = self.distortion
-        r2 = y * y + z * z
-        radial = 1 + r2 * (k1 + k2 * r2)
-        yd = y * radial + 2 * p1 * y * z + p2 * (r2 + 2 * y * y)
-        zd = z * radial + p1 * (r2 + 2 * z * z) + 2 * p2 * y * z
-        pixels = np.stack([self.fx * yd + self.cx, self.fy * zd + self.cy], axis=1)
+        pixels = np.empty((len(points), 2))
+        yd, zd = y, z
+        if any(self.distortion):
+            yy, zz, yz = y * y, z * z, y * z
+            r2 = yy + zz
+            radial = 1 + r2 * (k1 + k2 * r2)
+            yd = y * radial + 2 * p1 * yz + p2 * (r2 + 2 * yy)
+            zd = z * radial + p1 * (r2 + 2 * zz) + 2 * p2 * yz
+        pixels[:, 0] = self.fx * yd + self.cx
+        pixels[:, 1] = self.fy * zd + self.cy
         pixels[depth <= 0] = np.nan
         return pixels
 
@@ -65,7 +71,9 @@ class Camera:
             yz = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, np.array(self.distortion)).reshape(-1, 2)
         else:
             yz = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
-        return np.column_stack([np.ones(len(yz)), yz])
+        rays = np.empty((len(yz), 3))
+        rays[:, 0], rays[:, 1:] = 1.0, yz
+        return rays
 
     def shrunk(self, factor: int) -> Camera:
         """The camera whose image is this one's averaged over blocks of factor × factor pixels (INTER_AREA)."""
@@ -120,6 +128,10 @@ class LaserGrid:
 
     def directions(self) -> Array:
         """Unit directions (rows, columns, 3) of the rays in the left camera's frame."""
+        return self._directions.copy()
+
+    @cached_property
+    def _directions(self) -> Array:
         across = np.tan(self.fan[0] / 2) * np.linspace(-1, 1, self.columns)
         down = np.tan(self.fan[1] / 2) * np.linspace(-1, 1, self.rows)
         rays = np.empty((self.rows, self.columns, 3))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, radians
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.beside_kernels import shares_beyond
 from vision.capture import Image
 from vision.evidence import (
     Blade,
@@ -31,6 +33,7 @@ LAST_SAMPLES = 84  # profiles along a line when it is measured for good
 LEAST_SUPPORT = 0.5
 LEAST_SEEN = 0.38  # the same of a line beyond which dots are missing and before which none are
 FOLLOWED_PX = 25.0  # of a step that a line follows, worth as much as one unit of what else speaks for it
+ALIKE = cos(radians(4.0))  # of the angle between lines that may be one
 LEAST_RUN = 50.0  # px: a shorter stretch of an edge with no dots beside it is none
 
 
@@ -66,9 +69,8 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     """Candidates out of lines (k, 2) of (theta, signed rho), refined, with what speaks for them."""
     dots = blade.dots
     normal = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
-    rho = lines[:, 1]
-    distance = dots @ normal.T - rho  # (dots, lines), positive beyond the line along its normal
-    inside, outside = (distance < 7).mean(axis=0), (distance > -7).mean(axis=0)
+    rho = np.ascontiguousarray(lines[:, 1])
+    inside, outside = shares_beyond(dots, -normal, -rho, -7.0), shares_beyond(dots, normal, rho, -7.0)
     flip = outside > inside
     keep = np.maximum(inside, outside) > 0.99 - blade.strays
     normal[flip], rho = -normal[flip], np.where(flip, -rho, rho)
@@ -85,9 +87,9 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     normal, rho = np.vstack([one[0].normal for one in passes]), np.concatenate([one[0].rho for one in passes])
     start, stop = np.concatenate([one[1] for one in passes]), np.concatenate([one[2] for one in passes])
     profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, start, stop), 4, 0.6, LAST_SAMPLES)
-    crossed = (dots @ profile.normal.T - profile.rho > 2.5).mean(axis=0)
+    crossed = shares_beyond(dots, profile.normal, profile.rho, 2.5)
     low, high = beside(dots, profile.normal)
-    _, support = support_within(profile, low, high)
+    support = support_within(profile, low, high)
     first, last = runs(profile)
     which = np.flatnonzero((crossed <= blade.strays) & ((support >= LEAST_SUPPORT) | (last - first > LEAST_RUN)))
     if len(which) == 0:
@@ -108,7 +110,8 @@ def _followed(one: Candidate) -> float:
 
 def _same(one: Candidate, other: Candidate) -> bool:
     """Whether two candidates are the same step: their lines agree where either of them is seen."""
-    if float(one.outward @ other.outward) < np.cos(np.deg2rad(4.0)):
+    (x, y), (other_x, other_y) = one.outward.tolist(), other.outward.tolist()
+    if x * other_x + y * other_y < ALIKE:
         return False
     middle = one.outward * one.rho + sum(one.ends) / 2 * one.profile.direction[one.index]
     theirs = other.outward * other.rho + sum(other.ends) / 2 * other.profile.direction[other.index]
@@ -122,10 +125,10 @@ def _promising(normal: Array, rho: Array, blade: Blade, smooth: Image, noise: fl
     low, high = beside(dots, normal)
     profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, low, high), 8, 2.4, 40)
     low, high = beside(dots, profile.normal)
-    _, support = support_within(profile, low, high)
+    support = support_within(profile, low, high)
     first, last = runs(profile)
     which = (support > 0.6 * LEAST_SUPPORT) | (last - first > LEAST_RUN)
-    which &= (dots @ profile.normal.T - profile.rho > 5).mean(axis=0) < 0.2
+    which &= shares_beyond(dots, profile.normal, profile.rho, 5.0) < 0.2
     overlap = np.minimum(high, last) - np.maximum(low, first) > LEAST_RUN
     start, stop = np.where(overlap, np.maximum(low, first), first), np.where(overlap, np.minimum(high, last), last)
     start, stop = np.where(support > LEAST_SUPPORT, low, start), np.where(support > LEAST_SUPPORT, high, stop)
@@ -137,8 +140,8 @@ def _weighed(
     profile: Profiles, blade: Blade, smooth: Image, noise: float, other: OtherEye | None, low: Array, high: Array
 ) -> list[Candidate]:
     dots = blade.dots
-    crossed = (dots @ profile.normal.T - profile.rho > 2.5).mean(axis=0)
-    _, support = support_within(profile, low, high)
+    crossed = shares_beyond(dots, profile.normal, profile.rho, 2.5)
+    support = support_within(profile, low, high)
     first, last = runs_at_focus(profile)
     on_run = (profile.t >= first[:, None] - 1) & (profile.t <= last[:, None] + 1)
     step = typical_step(profile, on_run)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import acos, hypot, pi
 from typing import Any
 
 import numpy as np
@@ -102,7 +103,7 @@ def find_closed(
     largest: angle between two edges, rad."""
     best = _likeliest_spike(candidates, blade, (smooth.shape[1], smooth.shape[0]))
     for edges, sides, toward in _hypotheses(candidates[:MOST], blade, largest):
-        usual = float(np.mean([edge.step for edge in edges]))
+        usual = sum(edge.step for edge in edges) / len(edges)
         others = WORTH * sum(edge.worth for edge in edges) + (ALONE if len(edges) == 1 else 0.0)
         least = -np.inf if best is None else best.evidence - others
         ending = fit_ending(smooth, noise, sides, toward, blade, usual, least)
@@ -121,7 +122,8 @@ def _likeliest_spike(candidates: list[Candidate], blade: Blade, size: tuple[int,
     middle = np.median(blade.dots, axis=0)
     for a, one in enumerate(candidates[:MOST]):
         for two in candidates[a + 1 : MOST]:
-            opening = np.pi - np.arccos(np.clip(float(one.outward @ two.outward), -1, 1))
+            (x, y), (other_x, other_y) = one.outward.tolist(), two.outward.tolist()
+            opening = pi - acos(min(max(x * other_x + y * other_y, -1.0), 1.0))
             if not NARROWEST < opening < WIDEST:
                 continue
             apex = np.linalg.solve(np.stack([one.outward, two.outward]), np.array([one.rho, two.rho]))
@@ -205,12 +207,12 @@ def _hypotheses(
         for two in candidates[a + 1 :]:
             if not opposite(one, two, blade, largest):
                 continue
-            way = one.outward - two.outward
-            way = np.array([-way[1], way[0]]) / np.linalg.norm(way)
+            x, y = (one.outward - two.outward).tolist()
+            way = np.array([-y, x]) / hypot(x, y)
             for toward in (way, -way):
                 if any(_ends(edge, toward) for edge in (one, two)):
                     across = np.array([-toward[1], toward[0]])
-                    low, high = sorted((one, two), key=lambda edge: float(edge.outward @ across))
+                    low, high = (one, two) if one.outward @ across <= two.outward @ across else (two, one)
                     yield (low, high), (side_of(low, toward), side_of(high, toward)), toward
         for toward in (one.profile.direction[one.index], -one.profile.direction[one.index]):
             if _ends(one, toward):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from math import ceil, sqrt
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from vision.capture import Image
 from vision.motion import motion_between
 from vision.peaks import Peaks, Reach, gained, standing_out
 from vision.reduction import GREEN, half_green
-from vision.spot_fit import first_of_each, fit_spots
+from vision.spot_belief import believed, typical_shape
+from vision.spot_fit import fit_spots
 from vision.spot_light import lights
 
 Array = NDArray[Any]  # of floats
@@ -27,6 +29,7 @@ REGISTRATION_PX = 0.12  # how far laser-off and laser-on images may lie apart af
 LEAST_VARIANCE = 0.1  # grey levels², of rounding
 SIGNIFICANT = 3.0  # standard deviations of a spot's level
 LONE = 1.5  # times as uncertain is a spot's place where what lies under it is guessed from around it
+LEAST_SIGMA_PX = 0.02
 WORST_PX = 0.35  # a standard deviation from which a place is none
 APART_PX = 4.0  # nearer to a stronger one a spot is part of it
 
@@ -72,7 +75,7 @@ def find_spots(
         return Spots(np.empty((0, 2)), np.empty(0), np.empty(0), motion, shape)
     # not the strongest alone: those may be what two images of a steep background have left
     some = peaks[: len(peaks) * 2 // 3 : max(len(peaks) * 2 // 3 // SHAPED, 1)]
-    shape = _shape(on, off, some if len(some) > 2 else peaks, motion, shape)
+    shape = _shape(on, off, np.ascontiguousarray(some if len(some) > 2 else peaks), motion, shape)
     return _measured(on, off, peaks, motion, shape)
 
 
@@ -111,31 +114,23 @@ def _channels(image: Image) -> Image:
 
 
 def _measured(on: Image, off: Image | None, peaks: Peaks, motion: Array, shape: Array) -> Spots:
-    determinant = shape[0] * shape[2] - shape[1] ** 2
-    widest = float(np.sqrt(max(shape[0], shape[2]) / determinant))
-    reach = int(np.clip(np.ceil(2.2 * widest), *REACHES))
+    xx, xy, yy = shape.tolist()
+    widest = sqrt(max(xx, yy) / (xx * yy - xy * xy))
+    reach = min(max(ceil(2.2 * widest), REACHES[0]), REACHES[1])
     light = _lights(on, off, peaks, motion, reach)
-    found, quality = light.start, np.empty((len(peaks), 4))
-    fit_spots(light.signal, light.weights, light.burnt, np.tile(shape, (len(peaks), 1)), False, 5, found, quality)
-    # the fit's own residuals say how much of the claimed noise is true, as far as so few can
-    weight = light.signal.shape[1] / 3
-    scale = np.sqrt((20 + weight * quality[:, 3]) / (20 + weight))
-    if off is None:
-        scale *= LONE
-    sigma = np.sqrt(0.5 * (quality[:, 0] + quality[:, 1])) * scale
-    keep = (found[:, 2] > SIGNIFICANT * np.sqrt(quality[:, 2]) * scale) & (sigma < WORST_PX)
-    keep &= (np.abs(found[:, :2]) < reach - 0.6).all(axis=1)
-    uv = peaks + found[:, :2]
-    first_of_each(uv, APART_PX, keep)
-    return Spots(uv[keep], found[keep, 2], np.hypot(sigma[keep], 0.02), motion, shape)
+    found, shapes, quality = light.start, np.empty((len(peaks), 3)), np.empty((len(peaks), 4))
+    fit_spots(light.signal, light.weights, light.burnt, shape, shapes, False, 5, found, quality)
+    uv, sigma = np.empty((len(peaks), 2)), np.empty(len(peaks))
+    lone = LONE if off is None else 1.0
+    pixels, bound = light.signal.shape[1], reach - 0.6
+    keep = believed(peaks, found, quality, pixels, bound, lone, SIGNIFICANT, WORST_PX, APART_PX, uv, sigma)
+    return Spots(uv[keep], found[keep, 2], np.hypot(sigma[keep], LEAST_SIGMA_PX), motion, shape)
 
 
 def _shape(on: Image, off: Image | None, peaks: Peaks, motion: Array, shape: Array) -> Array:
     """The shape (3,) that most of the strongest spots have, from `shape` on."""
     light = _lights(on, off, peaks, motion, SHAPE_REACH)
-    shapes, quality = np.tile(shape, (len(peaks), 1)), np.empty((len(peaks), 4))
-    fit_spots(light.signal, light.weights, light.burnt, shapes, True, 5, light.start, quality)
-    determinant = shapes[:, 0] * shapes[:, 2] - shapes[:, 1] ** 2
-    uu, uv, vv = np.median(shapes / determinant[:, None], axis=0)  # of the inverses: (vv, -uv, uu)
-    result: Array = np.array([uu, uv, vv]) / (uu * vv - uv * uv)
-    return result
+    shapes, quality, typical = np.empty((len(peaks), 3)), np.empty((len(peaks), 4)), np.empty(3)
+    fit_spots(light.signal, light.weights, light.burnt, shape, shapes, True, 5, light.start, quality)
+    typical_shape(shapes, typical)
+    return typical

@@ -4,17 +4,17 @@ axis."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.beside_kernels import highest
 from vision.candidates import Candidate
 from vision.capture import Image
 from vision.ending_kernels import fittest, likeliest, summits_over
 from vision.evidence import Blade
-from vision.lane_kernels import seen_in_lanes, steps_in_lanes
+from vision.lane_kernels import seen_along, seen_in_lanes, steps_in_lanes
 from vision.lines import visible_stretch
 
 Array = NDArray[Any]  # of floats
@@ -56,18 +56,22 @@ def _shapes() -> tuple[Array, Array]:
 
 LENGTHS, DEPTHS = _shapes()
 OUTLINES = np.hypot(1.0, 2 * LENGTHS)  # length of each outline, in widths of the blade
+LONGEST_OUTLINE = float(OUTLINES.max())
 PRIORS = LOPSIDED * np.abs(2 * SHARES[DEPTHS.argmin(axis=1)] - 1) * (LENGTHS > 0)
 
 
 @dataclass(frozen=True)
 class Side:
     """An edge of the blade seen along an axis: offset across it is `offset + slope · station`. evidence: places along
-    the axis (m,) and what each says for an edge there (m,); None for a side that no edge was seen of."""
+    the axis (m,) and what each says for an edge there (m,), none for a side that no edge was seen of; sums (m + 1,):
+    of the evidence up to each, and most: the most that can speak for an edge that ends somewhere."""
 
     offset: float
     slope: float
     stations: Array
     evidence: Array
+    sums: Array
+    most: float
 
     def at(self, station: Array | float) -> Array:
         """Offset across the axis at stations."""
@@ -77,30 +81,21 @@ class Side:
         """What speaks for an edge that goes on to stations and no further."""
         if len(self.stations) == 0:
             return np.zeros_like(station)
-        return np.asarray(self._sums[np.searchsorted(self.stations, station)])
-
-    @property
-    def most(self) -> float:
-        """The most that can speak for an edge that ends somewhere."""
-        return float(self._sums.max())
-
-    @cached_property
-    def _sums(self) -> Array:
-        return np.concatenate([[0.0], np.cumsum(self.evidence)])
+        return np.asarray(self.sums[np.searchsorted(self.stations, station)])
 
 
 def side_of(edge: Candidate, toward: Array) -> Side:
     """An edge as seen along a direction (2,)."""
-    across = np.array([-toward[1], toward[0]])
     profile, k = edge.profile, edge.index
-    slope = float(edge.outward @ across)
-    direction = profile.direction[k]
     t = profile.t[k]
-    stations = edge.rho * float(edge.outward @ toward) + t * float(direction @ toward)
-    evidence = np.where(profile.agrees[k], SEEN, UNSEEN) * abs(float(t[1] - t[0])) / CORRELATED_PX
-    if stations[-1] < stations[0]:
-        stations, evidence = stations[::-1], evidence[::-1]
-    return Side(edge.rho / slope, -float(edge.outward @ toward) / slope, stations, evidence)
+    (x, y), (out_x, out_y), (along_x, along_y) = toward.tolist(), edge.outward.tolist(), profile.direction[k].tolist()
+    slope, lean = out_y * x - out_x * y, out_x * x + out_y * y
+    length = abs(float(t[1] - t[0])) / CORRELATED_PX
+    stations, evidence, sums = np.empty(len(t)), np.empty(len(t)), np.empty(len(t) + 1)
+    rate = along_x * x + along_y * y
+    agrees = profile.agrees[k]
+    most = seen_along(t, agrees, edge.rho * lean, rate, SEEN * length, UNSEEN * length, stations, evidence, sums)
+    return Side(edge.rho / slope, -lean / slope, stations, evidence, sums, most)
 
 
 def side_beside(dots: Array, toward: Array, sign: float, slope: float) -> Side:
@@ -108,7 +103,7 @@ def side_beside(dots: Array, toward: Array, sign: float, slope: float) -> Side:
     across = np.array([-toward[1], toward[0]])
     reach = dots @ across - slope * (dots @ toward)
     offset = float(reach.max()) + 8.0 if sign > 0 else float(reach.min()) - 8.0
-    return Side(offset, slope, np.zeros(0), np.zeros(0))
+    return Side(offset, slope, np.zeros(0), np.zeros(0), np.zeros(1), 0.0)
 
 
 @dataclass(frozen=True)
@@ -144,13 +139,14 @@ def fit_ending(
     low, high = sides
     height, width = smooth.shape[:2]
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
-    across = np.array([-toward[1], toward[0]])
-    along, aside = blade.dots @ toward, blade.dots @ across
+    along = blade.dots @ toward
     last_dot = float(along.max())
-    wide = float(high.at(last_dot) - low.at(last_dot))
-    if wide < NARROWEST or low.most + high.most + CLOSED * float(_weight(wide).max()) <= least_evidence:
+    upper_edge, lower_edge = high.offset + high.slope * last_dot, low.offset + low.slope * last_dot
+    wide, middle = upper_edge - lower_edge, (upper_edge + lower_edge) / 2
+    if wide < NARROWEST or low.most + high.most + CLOSED * wide * LONGEST_OUTLINE / CORRELATED_PX <= least_evidence:
         return None
-    middle = float(high.at(last_dot) + low.at(last_dot)) / 2
+    across = np.array([-toward[1], toward[0]])
+    aside = blade.dots @ across
     start, stop = visible_stretch(across[None], np.array([middle]), centre - 2)
     sign = 1.0 if np.array([-across[1], across[0]]) @ toward > 0 else -1.0
     border = float((stop if sign > 0 else -start)[0])
@@ -198,8 +194,7 @@ def _best(
     reach = LENGTHS * wide
     # Dots that the outline has to hold, and missing ones that it should not.
     strays = int(blade.strays * len(along) + 0.9) if len(along) >= 20 else 0
-    over = _summits_over(along, share_of, reach)
-    needed = np.partition(over, len(along) - 1 - strays, axis=1)[:, len(along) - 1 - strays] - DOT_ROOM
+    needed = highest(_summits_over(along, share_of, reach), strays) - DOT_ROOM
     gone, aside = blade.absent @ toward, blade.absent @ across
     share_gone = (aside - low.at(gone)) / np.maximum(high.at(gone) - low.at(gone), 1.0)
     between = (share_gone > 0.08) & (share_gone < 0.92)
@@ -216,7 +211,7 @@ def _best(
         shift,
         np.rint(reach / STEP).astype(np.int64),
         PRIORS,
-        _weight(wide),
+        wide * OUTLINES / CORRELATED_PX,  # independent places along each outline
         np.ceil((needed - s[0]) / STEP).astype(np.int64),
         (holes - s[0]) / STEP,
         low.until(ahead) + high.until(ahead),
@@ -243,11 +238,6 @@ def _best(
     outermost = station + skew * (lane_share - 0.5) * wide
     shoulder = float(s[places[k]] - reach[k])
     return Ending(toward, outermost, lane, shoulder, float(closing[k]), sigma, evidence, goes_on)
-
-
-def _weight(wide: float) -> Array:
-    """How much the lanes of each shape (k,) tell, in independent places along the outline."""
-    return np.asarray(wide * OUTLINES / CORRELATED_PX)
 
 
 def _summits_over(along: Array, shares: Array, reach: Array) -> Array:

@@ -49,31 +49,32 @@ def likeliest(
     lead = len(until) - count
     best = -np.inf
     uncovered = np.zeros(count + 1, np.int64)  # holes that lie inside from each place on
+    share, total = np.empty(count), np.empty(count)
     for k in range(len(reach)):
         uncovered[:] = 0
         for h in range(holes.shape[1]):
             uncovered[int(min(max(np.floor(holes[k, h]) + 1, 0), count))] += 1
         evidence[k], places[k], shares[k] = -np.inf, -1, 0.0
-        inside = 0
-        for place in range(count):
+        # what speaks for each place but for its lanes, and whether these could make it the best
+        inside, low, high = 0, count, 0
+        for place in range(min(count, last + 1)):
             inside += uncovered[place]
-            if place > last:
-                break
-            if place < first[k]:
-                continue
             at_shoulder = min(max(place - reach[k] + lead, 0), len(until) - 1)
-            total = base[k] + until[at_shoulder] + hole * inside
-            if total + weight[k] * closed <= max(best - near, evidence[k]):
-                continue
-            share = 0.0
-            for lane in range(lanes):
-                at = place - shift[k, lane]
-                if at >= 0:
-                    share += seen[lane, at]
-            share /= lanes
-            total += weight[k] * (open_ + (closed - open_) * share)
-            if total > evidence[k]:
-                evidence[k], places[k], shares[k] = total, place, share
+            total[place] = base[k] + until[at_shoulder] + hole * inside
+            if place >= first[k] and total[place] + weight[k] * closed > best - near:
+                low, high = min(low, place), place + 1
+        if high <= low:
+            continue
+        share[low:high] = 0.0
+        for lane in range(lanes):
+            start, back, row = max(low, shift[k, lane]), shift[k, lane], seen[lane]
+            for place in range(start, high):
+                share[place] += row[place - back]
+        for place in range(low, high):
+            seen_here = share[place] / lanes
+            value = total[place] + weight[k] * (open_ + (closed - open_) * seen_here)
+            if value > evidence[k] and total[place] + weight[k] * closed > best - near:
+                evidence[k], places[k], shares[k] = value, place, seen_here
         best = max(best, evidence[k])
 
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.beside_kernels import outermost, shares_agreeing, stretches_beside
 from vision.camera import Camera, StereoPair
 from vision.capture import Image
 from vision.evidence_kernels import line_of_most, longest_runs, median_steps, missing_dots, runs_about
-from vision.lane_kernels import steps_before
-from vision.lines import Profiles, steps_along
+from vision.lane_kernels import steps_before, steps_between, strongest_across
+from vision.lines import Profiles
 from vision.surface import Surface
+from vision.surface_kernels import median
 
 Array = NDArray[Any]  # of floats
 
@@ -49,11 +52,11 @@ class Blade:
 
     def on_surface(self, point: Array, way: Array) -> Array:
         """Unit vector (3,) on the surface that is seen as `way` (2,) at `point` (2,) of the image."""
-        ray = point / self.focal
-        slope = np.zeros(2) if self.slope is None else self.slope
-        lean = float(slope @ way) / max(1.0 - float(slope @ ray), 0.2)
-        vector = np.r_[lean, way + ray * lean]
-        return np.asarray(vector / np.linalg.norm(vector))
+        (u, v), (x, y), focal = point.tolist(), way.tolist(), self.focal
+        right, down = (0.0, 0.0) if self.slope is None else self.slope.tolist()
+        lean = (right * x + down * y) / max(1.0 - (right * u + down * v) / focal, 0.2)
+        x, y = x + u / focal * lean, y + v / focal * lean
+        return np.array([lean, x, y]) / sqrt(lean * lean + x * x + y * y)
 
     def skew(self, point: Array, toward: Array) -> float:
         """How much farther along `toward` (2,) a line across the blade, square to its axis on the surface, gets in the
@@ -83,30 +86,25 @@ def texture_between(smooth: Image, dots: Array) -> float:
     pixels."""
     if len(dots) < 3:
         return 0.0
-    apart = np.hypot(*(dots[:, None] - dots[None]).transpose(2, 0, 1))
-    first, second = np.nonzero(np.triu((apart > 16) & (apart < 44), 1))
-    if len(first) == 0:
+    change = steps_between(smooth, np.ascontiguousarray(dots), 16.0, 44.0, np.linspace(0.0, 1.0, 12))
+    if len(change) == 0:
         return 0.0
-    share = np.linspace(0.0, 1.0, 12)[:, None, None]
-    points = dots[first] * (1 - share) + dots[second] * share
-    change = np.abs(steps_along(smooth, points[..., 0].T, points[..., 1].T))
-    return float(np.quantile(change.max(axis=1), 0.8))
+    change.sort()
+    place = 0.8 * (len(change) - 1)
+    below, part = int(place), place - int(place)
+    return float(change[below] + part * (change[min(below + 1, len(change) - 1)] - change[below]))
 
 
-def support_within(profile: Profiles, low: Array, high: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Which places (k, m) lie between low and high (k,), all where too few do, and the share (k,) of them that
-    agree."""
-    within = (profile.t > low[:, None] - 8) & (profile.t < high[:, None] + 8)
-    within[within.sum(axis=1) < 6] = True
-    return within, (profile.agrees & within).sum(axis=1) / within.sum(axis=1)
+def support_within(profile: Profiles, low: Array, high: Array) -> Array:
+    """Share (k,) of the places between low and high (k,) that agree, of all where too few lie there."""
+    return np.asarray(shares_agreeing(profile.t, profile.agrees, low - 8, high + 8, 6))
 
 
 def beside(dots: Array, normal: Array) -> tuple[Array, Array]:
     """The stretch (low, high) (k,) of each line that has dots beside it."""
-    along = dots @ np.stack([-normal[:, 1], normal[:, 0]])
-    along.sort(axis=0)
-    few = round(0.04 * (len(along) - 1))
-    return along[few], along[len(along) - 1 - few]
+    low, high = np.empty((2, len(normal)))
+    stretches_beside(dots, normal, round(0.04 * (len(dots) - 1)), low, high)
+    return low, high
 
 
 def typical_step(profile: Profiles, within: NDArray[np.bool_]) -> Array:
@@ -120,8 +118,8 @@ def runs(profile: Profiles) -> tuple[Array, Array]:
     """First and last place (k,) of the longest stretch of each line on which its step goes on with small gaps."""
     first, last = np.empty((2, len(profile.t)))
     if len(profile.t):
-        length = np.maximum(profile.t[:, 1] - profile.t[:, 0], 1e-6)
-        window = int(np.clip(round(28.0 / float(np.median(length))), 3, 9))
+        length = max(median(profile.t[:, 1] - profile.t[:, 0]), 1e-6)
+        window = min(max(round(28.0 / length), 3), 9)
         longest_runs(profile.t, profile.agrees, window, LONGEST_GAP, first, last)
     return first, last
 
@@ -185,7 +183,8 @@ def _steps_before(profile: Profiles, blade: Blade, smooth: Image, low: Array, hi
     dots, and the places (k, places) along it."""
     share = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES
     places = low[:, None] + (high - low)[:, None] * share
-    across = np.sort(blade.dots @ profile.normal.T, axis=0)[round(0.85 * (len(blade.dots) - 1))]
+    last = len(blade.dots) - 1
+    across = outermost(blade.dots, profile.normal, last - round(0.85 * last))
     change = np.empty((len(low), INWARD_PLACES, INWARD_SAMPLES - 2))
     depth = profile.rho - across - 3
     steps_before(smooth, profile.normal, profile.rho, places, depth, FIRST_INWARD, INWARD_STEP, change)
@@ -215,18 +214,12 @@ def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], nois
     far = stereo.right.project(rays @ stereo.rotation.T).reshape(lines, places, 2)
     normal = profile.normal[:, None]
     telling = np.abs(((deeper - far) * normal).sum(axis=2)).mean(axis=1) > 6.0
-    behind = ((deeper - there) * normal).sum(axis=2)[..., None]
-    reach = np.linspace(-1.0, 1.0, PARALLAX_SAMPLES)
-    across = np.minimum(behind, 0) + (np.abs(behind) + 2 * PARALLAX_PX) * (reach + 1) / 2 - PARALLAX_PX
-    u = there[..., 0, None] + across * profile.normal[:, 0, None, None]
-    v = there[..., 1, None] + across * profile.normal[:, 1, None, None]
-    raw = steps_along(other.smooth, u, v)
-    gradient: Array = (raw + np.roll(raw, 1, 1) + np.roll(raw, -1, 1)) / 3
-    middle = PARALLAX_SAMPLES // 2
-    seen = (u[..., middle] > 4) & (v[..., middle] > 4)
-    seen &= (u[..., middle] < width - 5) & (v[..., middle] < height - 5)
-    seen &= agrees
-    like = np.abs(gradient)
-    strong = like.max(axis=2) > np.maximum(0.4 * np.abs(step), 1.2 * noise)
+    behind = ((deeper - there) * normal).sum(axis=2)
+    first, extent = np.minimum(behind, 0) - PARALLAX_PX, np.abs(behind) + 2 * PARALLAX_PX
+    like = np.empty((lines, places))
+    strongest_across(other.smooth, there, profile.normal, first, extent, PARALLAX_SAMPLES, like)
+    middle = there + (first + extent / 2)[..., None] * normal
+    seen = ((middle > 4) & (middle < (width - 5, height - 5))).all(axis=2) & agrees
+    strong = like > np.maximum(0.4 * np.abs(step), 1.2 * noise)
     share = (strong & seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
     return np.asarray(np.where(telling & (seen.sum(axis=1) >= 5), share, np.nan), float)

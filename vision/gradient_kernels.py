@@ -50,8 +50,11 @@ def gradients(tones: Image, dx: Integers, dy: Integers, strength: Integers) -> N
     flat = tones.reshape(-1)
     half = np.empty((8, width), np.int16)  # of the last rows, sums of 2 × 2 pixels
     even, odd = np.empty(width, np.int16), np.empty(width, np.int16)
-    dx[:2], dy[:2], strength[:2], dx[-2:], dy[-2:], strength[-2:] = 0, 0, 0, 0, 0, 0
-    dx[:, :2], dy[:, :2], strength[:, :2], dx[:, -2:], dy[:, -2:], strength[:, -2:] = 0, 0, 0, 0, 0, 0
+    for y in range(height):
+        border = y < 2 or y >= height - 2
+        for x in range(width if border else 4):
+            at = x if border or x < 2 else width - 4 + x
+            dx[y, at], dy[y, at], strength[y, at] = 0, 0, 0
     for c in range(channels):
         for y in range(height):
             top, bottom, sums = flat[2 * y * step + c :], flat[(2 * y + 1) * step + c :], half[y & 7]
@@ -93,9 +96,10 @@ def gradients(tones: Image, dx: Integers, dy: Integers, strength: Integers) -> N
 
 
 @compiled
-def ridge(dx: Integers, dy: Integers, strength: Integers, least: int, most: int) -> tuple[Floats, int]:
-    """(u, v, dx, dy) (4, n) of the pixels that are stronger than `least` and than their neighbours across the step, and
-    the strength they all reach: about the `most` strongest of them."""
+def ridge(dx: Integers, dy: Integers, strength: Integers, least: int, most: int) -> Floats:
+    """(u, v, angle, weight) (4, n) of the pixels that are stronger than `least` and than their neighbours across the
+    step, about the `most` strongest of them. angle: of the gradient, rad, to 3e-4; weight: at most one, which ten times
+    the strength has that they all reach."""
     height, width = strength.shape
     at_least = np.int32(least)
     is_ridge = np.empty(width, np.uint8)
@@ -128,10 +132,24 @@ def ridge(dx: Integers, dy: Integers, strength: Integers, least: int, most: int)
         count = kept
     found = np.empty((4, count), np.float32)
     flat_dx, flat_dy = dx.ravel(), dy.ravel()
+    u, v, angle, weight = found[0], found[1], found[2], found[3]
     for k in range(count):
         at = places[k]
-        found[0, k], found[1, k], found[2, k], found[3, k] = at % width, at // width, flat_dx[at], flat_dy[at]
-    return found, int(at_least)
+        u[k], v[k], angle[k], weight[k] = at % width, at // width, flat_dx[at], flat_dy[at]
+    none, one, right, straight = np.float32(0), np.float32(1), np.float32(np.pi / 2), np.float32(np.pi)
+    full = np.float32(1 / (5 * np.float32(at_least)))
+    c3, c2, c1 = np.float32(-0.0464964749), np.float32(0.15931422), np.float32(-0.327622764)
+    for k in range(count):
+        x, y = angle[k], weight[k]
+        wide, high = abs(x), abs(y)
+        part = min(wide, high) / max(wide, high)
+        square = part * part
+        turn = ((c3 * square + c2) * square + c1) * square * part + part
+        turn = right - turn if high > wide else turn
+        turn = straight - turn if x < none else turn
+        angle[k] = -turn if y < none else turn
+        weight[k] = min(np.sqrt(x * x + y * y) * full, one)
+    return found
 
 
 @compiled
@@ -158,3 +176,37 @@ def line_votes(
             r = int((rho + reach) / rho_step + 1.5)
             if 0 <= r < bins:
                 votes[a, r] += weight[k]
+
+
+@compiled
+def line_peaks(
+    votes: Floats, least: float, angle: NDArray[np.int64], place: NDArray[np.int64], strength: Floats
+) -> int:
+    """Peaks of votes (angles, bins), smoothed over three bins, that are more than `least` and the highest among three
+    angles and five bins; past the last angle lies the first with its bins turned round. Written: angle and place (m,)
+    of each and its strength (m,); returned: how many, at most m."""
+    angles, bins = votes.shape
+    smooth = np.zeros((angles + 2, bins + 4), np.float32)
+    third = np.float32(1 / 3)
+    for a in range(angles):
+        row, out = votes[a], smooth[a + 1]
+        for r in range(1, bins - 1):
+            out[r + 2] = (row[r - 1] + row[r] + row[r + 1]) * third
+        out[2] = (row[0] + row[1] + row[1]) * third
+        out[bins + 1] = (row[bins - 1] + row[bins - 2] + row[bins - 2]) * third
+    for r in range(bins):
+        smooth[0, r + 2], smooth[angles + 1, r + 2] = smooth[angles, bins + 1 - r], smooth[1, bins + 1 - r]
+    count = 0
+    for a in range(angles):
+        over, here, under = smooth[a], smooth[a + 1], smooth[a + 2]
+        for r in range(bins):
+            value = here[r + 2]
+            if value <= least or count == len(angle):
+                continue
+            highest = True
+            for k in range(5):
+                highest &= (over[r + k] <= value) & (here[r + k] <= value) & (under[r + k] <= value)
+            if highest:
+                angle[count], place[count], strength[count] = a, r, value
+                count += 1
+    return count

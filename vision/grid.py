@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from vision.camera import Camera, LaserGrid, StereoPair
 from vision.capture import Image
-from vision.grid_kernels import components, pairs, surfaces
+from vision.grid_kernels import components, medians, pairs, surfaces
 
 Array = NDArray[Any]  # of floats
 Indices = NDArray[np.int64]
@@ -188,7 +188,7 @@ def _like_the_rest(matches: Matches) -> NDArray[np.bool_]:
     and a spot that is no dot has no reason to share it."""
     if len(matches) == 0:
         return np.ones(0, bool)
-    usual = np.array([np.median(matches.misfit[matches.surface == k]) for k in range(matches.surface.max() + 1)])
+    usual = medians(matches.misfit, matches.surface)
     return np.asarray(matches.misfit < 4 * usual[matches.surface] + GRID_SIGMA)
 
 
@@ -197,7 +197,7 @@ def nearest_surface(matches: Matches, least: int) -> Matches:
     if len(matches) == 0:
         return matches
     count = np.bincount(matches.surface)
-    depth = np.array([np.median(matches.inverse_depth[matches.surface == k]) for k in range(len(count))])
+    depth = medians(matches.inverse_depth, matches.surface)
     enough = count >= max(least, SURFACE_SHARE * count.max())
     if not enough.any():
         return matches.take(matches.surface == 0)

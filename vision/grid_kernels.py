@@ -182,3 +182,25 @@ def surfaces(
         if number == 0:
             rival = scores.max() / max(first, 1e-9)
         number += 1
+
+
+@compiled
+def medians(values: Array, label: Indices) -> Array:
+    """Median (m,) of the values (n,) of each label, which count from 0 on."""
+    number = 0
+    for one in label:
+        number = max(number, one + 1)
+    middle, ordered = np.empty(number), np.empty(len(values))
+    for one in range(number):
+        count = 0
+        for k in range(len(values)):
+            if label[k] != one:
+                continue
+            place = count
+            while place > 0 and ordered[place - 1] > values[k]:
+                ordered[place] = ordered[place - 1]
+                place -= 1
+            ordered[place] = values[k]
+            count += 1
+        middle[one] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2]) if count > 0 else np.nan
+    return middle

@@ -36,24 +36,65 @@ def _sampled(
 
 
 @compiled
-def steps_in_rows(image: Image, u: Floats, v: Floats, change: Floats) -> None:
-    """Central differences, written to change (rows, n - 2), along rows of pixels u, v (rows, n): of the tone of the
-    image (h, w, c) that changes most."""
-    rows, count = u.shape
+def steps_between(image: Image, points: Floats, least: float, most: float, shares: Floats) -> Floats:
+    """The greatest of the central differences, of the tone of the image (h, w, c) that changes most, among samples at
+    some shares (m,) of the way between each two of points (n, 2) px that are farther than least and nearer than most
+    px apart."""
     height, width, channels = image.shape
+    count = len(shares)
     flat, tone = image.reshape(-1), np.empty((channels, count))
     room, corner = np.empty((2, count)), np.empty(count, np.int64)
-    for row in range(rows):
-        for i in range(count):
-            room[0, i], room[1, i] = u[row, i], v[row, i]
-        _sampled(flat, height, width, channels, count, room, corner, tone)
-        for i in range(count - 2):
-            most = tone[0, i + 2] - tone[0, i]
+    change, found = np.empty(len(points) * len(points)), 0
+    for a in range(len(points)):
+        for b in range(a + 1, len(points)):
+            apart = np.sqrt((points[b, 0] - points[a, 0]) ** 2 + (points[b, 1] - points[a, 1]) ** 2)
+            if not least < apart < most:
+                continue
+            for i in range(count):
+                room[0, i] = points[a, 0] * (1 - shares[i]) + points[b, 0] * shares[i]
+                room[1, i] = points[a, 1] * (1 - shares[i]) + points[b, 1] * shares[i]
+            _sampled(flat, height, width, channels, count, room, corner, tone)
+            change[found] = 0.0
+            for c in range(channels):
+                for i in range(count - 2):
+                    change[found] = max(change[found], abs(tone[c, i + 2] - tone[c, i]))
+            found += 1
+    return change[:found]
+
+
+@compiled
+def strongest_across(
+    image: Image, at: Floats, normals: Floats, first: Floats, extent: Floats, samples: int, strongest: Floats
+) -> None:
+    """The greatest step, written to strongest (k, m), on samples across each of k lines at places at (k, m, 2) px of an
+    image (h, w, c): along its normal (k, 2) from first (k, m) px over an extent (k, m); the mean of three places'
+    steps, each of the tone that changes most."""
+    lines, places = strongest.shape
+    height, width, channels = image.shape
+    flat, tone = image.reshape(-1), np.empty((channels, samples))
+    room, corner = np.empty((2, samples)), np.empty(samples, np.int64)
+    raw = np.empty((places, samples - 2))
+    for line in range(lines):
+        for m in range(places):
+            step = extent[line, m] / (samples - 1)
+            for i in range(samples):
+                across = first[line, m] + step * i
+                room[0, i] = at[line, m, 0] + across * normals[line, 0]
+                room[1, i] = at[line, m, 1] + across * normals[line, 1]
+            _sampled(flat, height, width, channels, samples, room, corner, tone)
+            row = raw[m]
+            for i in range(samples - 2):
+                row[i] = tone[0, i + 2] - tone[0, i]
             for c in range(1, channels):
-                other = tone[c, i + 2] - tone[c, i]
-                if abs(other) > abs(most):
-                    most = other
-            change[row, i] = most
+                for i in range(samples - 2):
+                    other = tone[c, i + 2] - tone[c, i]
+                    row[i] = other if abs(other) > abs(row[i]) else row[i]
+        for m in range(places):
+            before, here, after = raw[m - 1 if m > 0 else places - 1], raw[m], raw[m + 1 if m + 1 < places else 0]
+            most = 0.0
+            for i in range(samples - 2):
+                most = max(most, abs(here[i] + before[i] + after[i]))
+            strongest[line, m] = most / 3
 
 
 @compiled
@@ -169,3 +210,21 @@ def steps_before(
                 for c in range(channels):
                     most = max(most, abs(tone[c, i + 2] - tone[c, i]))
                 change[line, m, i] = most
+
+
+@compiled
+def seen_along(
+    t: Floats, agrees: NDArray[np.bool_], start: float, rate: float, seen: float, unseen: float, stations: Floats,
+    evidence: Floats, sums: Floats,
+) -> float:  # fmt: skip
+    """An edge's places t (m,) as stations (m,) = start + rate · t in rising order, what each says for the edge,
+    evidence (m,), as its step agrees or not, and the sums (m + 1,) of that up to each; returned: the greatest sum."""
+    count, most = len(t), 0.0
+    sums[0] = 0.0
+    for m in range(count):
+        k = m if rate * (t[count - 1] - t[0]) >= 0 else count - 1 - m
+        stations[m] = start + rate * t[k]
+        evidence[m] = seen if agrees[k] else unseen
+        sums[m + 1] = sums[m] + evidence[m]
+        most = max(most, sums[m + 1])
+    return most

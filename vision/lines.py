@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.capture import Image
-from vision.gradient_kernels import SUM, gradients, line_votes, median_roughness, ridge
-from vision.lane_kernels import steps_in_rows
+from vision.gradient_kernels import SUM, gradients, line_peaks, line_votes, median_roughness, ridge
 from vision.profile_kernels import refine, stretches
 from vision.workspace import lent
 
@@ -23,10 +22,10 @@ ANGLES = 60  # bins of 3° modulo 180°
 SPREAD = 1  # bins to each side that a pixel votes for: its gradient's direction is no better known
 MOST_PIXELS = 6000  # edge pixels that vote, the strongest
 RHO_STEP = 4.0  # px
+LEAST_VOTES = 4.0  # of the strongest pixels, for a line
 REACH = 7  # px across a candidate line within which its step is looked for
 SAMPLES = 96  # profiles along a candidate line
 MARGIN = 3.0  # px along the image border in which no steps are sought
-LEAST_SCATTER_PX, LEAST_SIGMA_PX = 0.1, 0.04  # of steps about their line, and of a line: what no fit falls below
 
 
 def sensor_noise(tones: Image) -> float:
@@ -51,11 +50,11 @@ def edge_pixels(tones: Image, noise: float) -> Gradients:
     strength = lent("strength", size, np.uint16)
     gradients(np.ascontiguousarray(tones), dx, dy, strength)
     least = round(2 * SUM * max(2.0, 1.4 * noise))
-    (u, v, gx, gy), threshold = ridge(dx, dy, strength, least, MOST_PIXELS)
-    weight = np.minimum(np.hypot(gx, gy) / np.float32(5 * threshold), np.float32(1))
+    u, v, angle, weight = ridge(dx, dy, strength, least, MOST_PIXELS)
     centre = (np.array(tones.shape[1::-1]) - 1) / 2
-    position = np.stack([u, v], axis=1) * 2.0 + (0.5 - centre)
-    return Gradients(position, np.arctan2(gy, gx), weight)
+    position = np.empty((len(u), 2))
+    position[:, 0], position[:, 1] = 2.0 * u + (0.5 - centre[0]), 2.0 * v + (0.5 - centre[1])
+    return Gradients(position, angle, weight)
 
 
 def smoothed(tones: Image, room: Image | None = None) -> Image:
@@ -76,16 +75,6 @@ def sampled(image: Image, u: Array, v: Array) -> NDArray[np.float32]:
     return np.asarray(values.reshape(*u.shape, -1), np.float32)
 
 
-def steps_along(image: Image, u: Array, v: Array) -> Array:
-    """Central differences (…, n - 2) of an image (h, w, c) along rows of pixels u, v (…, n): of the tone that changes
-    most; the border continues outward."""
-    count = u.shape[-1]
-    change = np.empty((u.size // count, count - 2))
-    rows_u, rows_v = (np.ascontiguousarray(values, float).reshape(-1, count) for values in (u, v))
-    steps_in_rows(image, rows_u, rows_v, change)
-    return change.reshape(*u.shape[:-1], count - 2)
-
-
 def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Array, Array]:
     """(theta, rho) (k, 2) with theta in [0, π) and signed rho in working px, and votes (k,), the strongest first.
 
@@ -94,16 +83,14 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
     reach = float(np.hypot(*size)) / 2
     table = np.zeros((ANGLES, int(2 * reach / RHO_STEP) + 3), np.float32)
     line_votes(pixels.position, pixels.angle, pixels.weight, SPREAD, reach, RHO_STEP, table)
-    theta = (np.arange(ANGLES) + 0.5) * np.pi / ANGLES
-    wrapped = np.vstack([table[-2:, ::-1], table, table[:2, ::-1]])
-    wrapped = cv2.blur(wrapped, (3, 1))
-    highest = cv2.dilate(wrapped, np.ones((3, 5), np.uint8))
-    peaks = (wrapped == highest)[2:-2] & (wrapped[2:-2] > 4)
-    a, r = np.nonzero(peaks)
-    strength = wrapped[2:-2][a, r].astype(float)
-    order = np.argsort(-strength, kind="stable")[:most]
-    rho = (r[order] - 1) * RHO_STEP - reach
-    return np.column_stack([theta[a[order]], rho]), strength[order]
+    angle, place = np.empty((2, table.size // 4), np.int64)
+    strength = np.empty(table.size // 4)
+    count = line_peaks(table, LEAST_VOTES, angle, place, strength)
+    order = np.argsort(-strength[:count], kind="stable")[:most]
+    lines = np.empty((len(order), 2))
+    lines[:, 0] = (angle[order] + 0.5) * (np.pi / ANGLES)
+    lines[:, 1] = (place[order] - 1) * RHO_STEP - reach
+    return lines, strength[order]
 
 
 @dataclass(frozen=True)
@@ -160,22 +147,8 @@ def refine_lines(
     lines = len(rho)
     t, offset, step = np.empty((3, lines, samples))
     agrees = np.empty((lines, samples), np.bool_)
-    fit, spread = np.empty((2, lines, 3))
+    fitted, turned = np.empty((4, lines)), np.empty((lines, 2))
     normal, rho, focus = (np.ascontiguousarray(values, float) for values in (normal, rho, focus))
     least, largest = max(1.2, 1.4 * noise), float(np.deg2rad(slopes_deg))
-    refine(smooth, normal, rho, focus, MARGIN, least, reach, largest, t, offset, step, agrees, fit, spread)
-    direction = np.column_stack([-normal[:, 1], normal[:, 0]])
-    turn = np.arctan(fit[:, 1])
-    new_normal = np.column_stack(
-        [
-            normal[:, 0] * np.cos(turn) - direction[:, 0] * np.sin(turn),
-            normal[:, 1] * np.cos(turn) - direction[:, 1] * np.sin(turn),
-        ]
-    )
-    point = normal * (rho + fit[:, 0])[:, None] + direction * focus[:, None]
-    new_rho = (new_normal * point).sum(axis=1)
-    # Neighbouring profiles share pixels: three of them count as one.
-    variance = 2 * (spread[:, 2] + LEAST_SCATTER_PX**2)
-    slope_sigma = np.sqrt(variance * spread[:, 1])
-    rho_sigma = np.sqrt(variance * spread[:, 0] + LEAST_SIGMA_PX**2)
-    return Profiles(new_normal, new_rho, t, offset, step, agrees, slope_sigma, rho_sigma, 2 * fit[:, 2], focus)
+    refine(smooth, normal, rho, focus, MARGIN, least, reach, largest, t, offset, step, agrees, fitted, turned)
+    return Profiles(turned, fitted[0], t, offset, step, agrees, fitted[2], fitted[3], fitted[1], focus)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import Any
 
 import cv2
@@ -49,8 +50,8 @@ def motion_between(off: Image, on: Image, guess: Array | None = None) -> Array:
     if not start.any():
         _search(*pairs[2], start)
     middle = _followed(*pairs[1], 2 * _followed(*pairs[2], start, 4), 6)
-    motion = _followed(*pairs[0], 2 * middle, 3, 2) if np.hypot(*middle) * 4 > SMALLEST_MOTION else middle * 2
-    if not SMALLEST_MOTION < 2 * np.hypot(*motion) < LARGEST_MOTION:
+    motion = _followed(*pairs[0], 2 * middle, 3, 2) if hypot(middle[0], middle[1]) * 4 > SMALLEST_MOTION else middle * 2
+    if not SMALLEST_MOTION < 2 * hypot(motion[0], motion[1]) < LARGEST_MOTION:
         return np.zeros(2)
     if _difference(*pairs[1], motion / 2) > GAIN * _difference(*pairs[1], np.zeros(2)):
         return np.zeros(2)

@@ -175,15 +175,19 @@ def _maxima(gain: Array, step: Array, noise: float, apart: float, threshold: flo
     height, width = gain.shape
     count = 0
     least, part, bound = np.float32(noise), np.float32(apart), np.float32(threshold)
-    high, places = np.empty(width, np.uint8), np.empty(width + 1, np.int64)
+    high, places = np.zeros((width + 7) // 8 * 8, np.uint8), np.empty(width + 1, np.int64)
+    eights = high.view(np.uint64)
     for v in range(2, height - 2):
         values, slopes, may = gain[v], step[v], mask[top + v, left:]
         for u in range(width):
             high[u] = (values[u] > bound * max(least, part * slopes[u])) & (may[u] > 0)
         found = 0
-        for u in range(2, width - 2):
-            places[found] = u
-            found += high[u]
+        for eight in range(len(eights)):
+            if eights[eight] == 0:
+                continue
+            for u in range(max(8 * eight, 2), min(8 * eight + 8, width - 2)):
+                places[found] = u
+                found += high[u]
         for u in places[:found]:
             if count == len(level):
                 continue

@@ -127,7 +127,9 @@ class Eye:
     ) -> BladeObservation:
         factor, camera, laser = self.factor, self._stereo.left, self.geometry.laser
         assert laser is not None
-        clean = without_spots(images["left_laser"], images.get("left"), left)
+        tones = images["left_laser"]
+        own = tones if tones.shape[2] > 1 else lent("clean", tones.shape, np.uint8)  # grey ones are the camera's image
+        clean = without_spots(tones, images.get("left"), left, own)
         smooth = smoothed(clean, lent("smooth left", clean.shape, np.uint8))
         seeds = left.uv[blade.left]
         dots = seeds - camera.centre

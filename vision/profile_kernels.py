@@ -19,6 +19,7 @@ SLOPE_HELD, BEND_HELD = 0.05, 1e-4  # what a fit of few steps is held to: slope,
 OFFSET_HELD = 1e-4  # information about the offset that a fit starts with, 1/px²
 LEAST_WEIGHT = 2.0  # of all steps, below which a fit is left as it is
 TOLERANCES = (2.0, 1.2, 1.0, 1.0)  # px: how far from the curve steps lose weight, pass by pass
+LEAST_SCATTER_PX, LEAST_SIGMA_PX = 0.1, 0.04  # of steps about their line, and of a line: what no fit falls below
 AGREES_PX = 1.5  # from the curve, at which a step is no part of the line
 
 
@@ -102,16 +103,16 @@ def _solved(info: Floats, y0: float, y1: float, y2: float) -> tuple[float, float
 @compiled
 def refine(
     smooth: Image, normals: Floats, rhos: Floats, focuses: Floats, margin: float, least: float, reach: int,
-    largest_slope: float, t: Floats, offset: Floats, step: Floats, agrees: NDArray[np.bool_], fit: Floats,
-    spread: Floats,
+    largest_slope: float, t: Floats, offset: Floats, step: Floats, agrees: NDArray[np.bool_], fitted: Floats,
+    normal: Floats,
 ) -> None:  # fmt: skip
     """The steepest steps across each of k lines and the gently bent curve on which most of them lie.
 
     smooth (h, w, c); normals (k, 2), rhos (k,) in the image frame; focuses (k,): the place along each line that counts
     most. margin: px along the image border without profiles. least: of a step that is real. largest_slope: rad.
     Written: places t (k, m), offset (k, m) px of each step from the curve, step (k, m) along the normal, agrees
-    (k, m), fit (k, 3): offset at the focus, slope, half the bend per px; spread (k, 3): what unit variance of
-    the steps makes of offset's and slope's, and the steps' variance.
+    (k, m), normal (k, 2) of the curve's tangent at the focus, and fitted (4, k): its offset, the bend per px, and the
+    standard deviations of the slope and of the offset.
     """
     lines, samples = t.shape
     height, width, channels = smooth.shape
@@ -188,7 +189,12 @@ def refine(
             if agrees[line, m]:
                 scatter += residual * residual * near[m]
                 used += near[m]
-        fit[line, 0], fit[line, 1], fit[line, 2] = shift, slope, curve
-        spread[line, 0] = _solved(info, 1.0, 0.0, 0.0)[0]
-        spread[line, 1] = _solved(info, 0.0, 1.0, 0.0)[1]
-        spread[line, 2] = scatter / max(used, 1.0)
+        # neighbouring profiles share pixels: three of them count as one, as near as can be told
+        variance = 2 * (scatter / max(used, 1.0) + LEAST_SCATTER_PX**2)
+        turn = 1.0 / np.sqrt(1.0 + slope * slope)
+        normal[line, 0], normal[line, 1] = turn * (nx + slope * ny), turn * (ny - slope * nx)
+        foot_u, foot_v = nx * (rho + shift) - ny * focuses[line], ny * (rho + shift) + nx * focuses[line]
+        fitted[0, line] = normal[line, 0] * foot_u + normal[line, 1] * foot_v
+        fitted[1, line] = 2 * curve
+        fitted[2, line] = np.sqrt(variance * _solved(info, 0.0, 1.0, 0.0)[1])
+        fitted[3, line] = np.sqrt(variance * _solved(info, 1.0, 0.0, 0.0)[0] + LEAST_SIGMA_PX**2)

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate
 from vision.capture import Image
-from vision.lines import sampled
+from vision.compiled import compiled
 
 Array = NDArray[Any]  # of floats
 
+ACROSS, ENDS = 15, 4  # samples across a step, one px apart, and how many at either end tell its height
+LEAST_RISE = 2.0  # grey levels
 SHARPEST = 0.55  # of a step's height, gained within one pixel of a sharp image at working size
 
 
@@ -20,32 +22,63 @@ def exposure(image: Image, pixels: Array) -> float:
     """Mean grey of a laser-off image at pixels (n, 2), 0 to 255."""
     if len(pixels) == 0:
         return 0.0
-    at = np.rint(pixels).astype(int)
-    height, width = image.shape[:2]
-    return float(image[np.clip(at[:, 1], 0, height - 1), np.clip(at[:, 0], 0, width - 1)].mean())
+    last = np.array(image.shape[1::-1]) - 1
+    at = np.minimum(np.maximum(np.rint(pixels), 0), last).astype(int)
+    return float(image[at[:, 1], at[:, 0]].mean())
 
 
 def sharpness(image: Image, edges: tuple[Candidate, ...]) -> float:
     """0 (blurred) to 1: how steep the edges are, against their height. 0 without an edge to judge by."""
     best = 0.0
-    height, width = image.shape[:2]
-    centre = np.array([(width - 1) / 2, (height - 1) / 2])
-    across = np.arange(-7.0, 8.0)
+    centre = np.array([(image.shape[1] - 1) / 2, (image.shape[0] - 1) / 2])
     for edge in edges:
         profile, k = edge.profile, edge.index
-        places = profile.t[k][profile.agrees[k]][::3]
-        offset = profile.offset[k][profile.agrees[k]][::3]
+        agrees = profile.agrees[k]
+        places, offset = profile.t[k][agrees][::3], profile.offset[k][agrees][::3]
         if len(places) < 4:
             continue
         points = edge.outward * edge.rho + places[:, None] * profile.direction[k] + centre
-        points = points + offset[:, None] * edge.outward
-        u, v = points[:, :1] + across * edge.outward[0], points[:, 1:] + across * edge.outward[1]
-        values = sampled(image, u, v)
-        rises = np.abs(values[:, -4:].mean(axis=(0, 1)) - values[:, :4].mean(axis=(0, 1)))
-        values = values[..., int(np.argmax(rises))]
-        sign = np.sign(values[:, -4:].mean(axis=1) - values[:, :4].mean(axis=1))
-        mean = (values * sign[:, None]).mean(axis=0)
-        rise = float(mean[-4:].mean() - mean[:4].mean())
-        if rise > 2:
-            best = max(best, float(np.diff(mean).max()) / rise)
+        points += offset[:, None] * edge.outward
+        best = max(best, _steepness(image, points, edge.outward))
     return min(best / SHARPEST, 1.0)
+
+
+@compiled
+def _steepness(image: Image, points: Array, normal: Array) -> float:
+    """The steepest change per px across a step, over its height: of the mean of what samples along the normal (2,) show
+    about each of some points (n, 2) px, in the tone that changes most; 0 where the step is too low to tell."""
+    height, width, channels = image.shape
+    count = len(points)
+    values = np.empty((channels, count, ACROSS))
+    for n in range(count):
+        for i in range(ACROSS):
+            u = min(max(points[n, 0] + (i - ACROSS // 2) * normal[0], 0.0), width - 1.0)
+            v = min(max(points[n, 1] + (i - ACROSS // 2) * normal[1], 0.0), height - 1.0)
+            x, y = min(int(u), width - 2), min(int(v), height - 2)
+            du, dv = u - x, v - y
+            for c in range(channels):
+                above = image[y, x, c] * (1 - du) + image[y, x + 1, c] * du
+                below = image[y + 1, x, c] * (1 - du) + image[y + 1, x + 1, c] * du
+                values[c, n, i] = above * (1 - dv) + below * dv
+    most, clearest, rises = -1.0, 0, np.empty((channels, count))
+    for c in range(channels):
+        total = 0.0
+        for n in range(count):
+            rise = 0.0
+            for i in range(ENDS):
+                rise += values[c, n, ACROSS - 1 - i] - values[c, n, i]
+            rises[c, n] = rise / ENDS
+            total += rises[c, n]
+        if abs(total) > most:
+            most, clearest = abs(total), c
+    mean = np.zeros(ACROSS)
+    for n in range(count):
+        sign = np.sign(rises[clearest, n])
+        for i in range(ACROSS):
+            mean[i] += sign * values[clearest, n, i] / count
+    height_of_step, steepest = 0.0, 0.0
+    for i in range(ENDS):
+        height_of_step += (mean[ACROSS - 1 - i] - mean[i]) / ENDS
+    for i in range(ACROSS - 1):
+        steepest = max(steepest, mean[i + 1] - mean[i])
+    return steepest / height_of_step if height_of_step > LEAST_RISE else 0.0

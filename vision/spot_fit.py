@@ -54,11 +54,12 @@ def _equations(
     squares of residuals, their number.
 
     pixels (side, 3 · WIDE): signal, weights, and 1 where burnt, weightless from column `side` on. sums (17 · WIDE,):
-    room for sums down each column, which are taken side by side and only then put together."""
+    float32, room for sums down each column, which are taken side by side and only then put together."""
     reach, wide = side // 2, (side + 3) // 4 * 4
-    u, v, level, base = spot[0], spot[1], spot[2], spot[3]
+    u, v, level, base = spot[0], spot[1], np.float32(spot[2]), np.float32(spot[3])
     pxx, pxy, pyy = shape[0], shape[1], shape[2]
     sums[:] = 0.0
+    none, one = np.float32(0), np.float32(1)
     # the bell in each column's first row, and by how much it falls from there to the next row, and that from row to row
     x, y = -reach - u, -reach - v
     bell, down = (
@@ -69,14 +70,14 @@ def _equations(
     for k in range(side):
         sums[k], sums[WIDE + k] = bell, down
         bell, across, down = bell * across, across * change, down * turn
-    fall = np.exp(-pyy)
+    fall = np.float32(np.exp(-pyy))
     for i in range(side):
-        y = i - reach - v
+        y = np.float32(i - reach - v)
         row = pixels[i]
         for k in range(wide):
             light = sums[k]
             residual = row[k] - level * light - base
-            weight = 0.0 if (row[2 * WIDE + k] > 0) & (residual < 0) else row[WIDE + k]
+            weight = none if (row[2 * WIDE + k] > none) & (residual < none) else row[WIDE + k]
             single = weight * light
             both = single * light
             apart = single * residual
@@ -92,7 +93,7 @@ def _equations(
             sums[9 * WIDE + k] += apart
             sums[10 * WIDE + k] += apart * y
             sums[11 * WIDE + k] += weight * residual * residual
-            sums[12 * WIDE + k] += 1.0 if weight > 0 else 0.0
+            sums[12 * WIDE + k] += one if weight > none else none
             if full:
                 sums[13 * WIDE + k] += single * y * y
                 sums[14 * WIDE + k] += both * y * y * y
@@ -149,25 +150,30 @@ def _equations(
 
 @compiled
 def fit_spots(
-    signal: Floats, weights: Floats, burnt: NDArray[np.bool_], shapes: Floats, free_shape: bool, steps: int,
-    found: Floats, quality: Floats,
+    signal: Floats, weights: Floats, burnt: NDArray[np.bool_], usual: Floats, shapes: Floats, free_shape: bool,
+    steps: int, found: Floats, quality: Floats,
 ) -> None:  # fmt: skip
     """Fit a spot to each square by Gauss and Newton, weighting by `weights` (n, p).
 
-    burnt (n, p): pixels that say no more than "at least". shapes (n, 3), fitted too if free_shape. found (n, 4): u, v
-    from the middle, level, base; holds the start. Written besides: quality (n, 4) = variances of u, of v, of the
-    level, mean of weighted squared residuals."""
+    burnt (n, p): pixels that say no more than "at least". usual (3,): the shape all start with, and keep
+    unless free_shape. found (n, 4): u, v from the middle, level, base; holds the start. Written besides: shapes (n, 3),
+    quality (n, 4) = variances of u, of v, of the level, mean of weighted squared residuals."""
     count, size = signal.shape
     bound = int(np.sqrt(size) + 0.5) // 2 - 0.5
     unknowns = 7 if free_shape else 4
     side = int(np.sqrt(size) + 0.5)
-    normal, right, sums, square = np.zeros((7, 7)), np.zeros(7), np.zeros(17 * WIDE), np.zeros((side, 3 * WIDE))
+    normal, right = np.zeros((7, 7)), np.zeros(7)
+    sums, square = np.zeros(17 * WIDE, np.float32), np.zeros((side, 3 * WIDE), np.float32)
     for n in range(count):
         spot, shape = found[n], shapes[n]
-        for k in range(size):
-            row, column = k // side, k % side
-            square[row, column], square[row, WIDE + column] = signal[n, k], weights[n, k]
-            square[row, 2 * WIDE + column] = burnt[n, k]
+        shape[0], shape[1], shape[2] = usual[0], usual[1], usual[2]
+        for row in range(side):
+            line, start = square[row], row * side
+            lit, weighty, lost = signal[n, start:], weights[n, start:], burnt[n, start:]
+            for k in range(side):
+                line[k] = lit[k]
+                line[WIDE + k] = weighty[k]
+                line[2 * WIDE + k] = lost[k]
         misfit, number, scale = 0.0, 0.0, 1.0
         for _ in range(steps):
             misfit, number = _equations(square, side, spot, shape, free_shape, sums, normal, right)
@@ -205,13 +211,3 @@ def fit_spots(
             a, b, c = right[2], right[3], right[1]
             _solve(normal, right, 4, True)
             quality[n, which] = a * right[2] + b * right[3] + c * right[1]
-
-
-@compiled
-def first_of_each(uv: Floats, apart_px: float, keep: NDArray[np.bool_]) -> None:
-    """Clear keep (n,) where an earlier point of uv (n, 2) that is kept lies nearer than a distance."""
-    for n in range(len(uv)):
-        for m in range(n):
-            if keep[m] and (uv[n, 0] - uv[m, 0]) ** 2 + (uv[n, 1] - uv[m, 1]) ** 2 < apart_px**2:
-                keep[n] = False
-                break

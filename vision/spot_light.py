@@ -68,32 +68,34 @@ def _differences(
     laser-off image about its surface, and of the difference along the border."""
     count, size = signal.shape
     side = int(np.sqrt(size) + 0.5)
-    reach = side // 2
+    reach, wide = side // 2, side + 1
     shift_u, shift_v = int(np.floor(-motion[0])), int(np.floor(-motion[1]))
     part_u, part_v = np.float32(-motion[0] - shift_u), np.float32(-motion[1] - shift_v)
-    still, rest = np.empty((side, side), np.float32), np.empty(size, np.float32)
-    lit, upper, lower = np.empty(side, np.float32), np.empty(side + 1, np.float32), np.empty(side + 1, np.float32)
-    flat, quarter = still.ravel(), np.float32(0.25)
+    flat_on, flat_off = on.reshape(-1), off.reshape(-1)
+    lit, flat, rest = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
+    raw, moved = np.zeros(wide * wide + 1, np.float32), np.zeros(wide * side, np.float32)
+    right, under, across_under = raw[1:], raw[wide:], raw[wide + 1 :]
+    behind, ahead, over, below = flat[side - 1 :], flat[side + 1 :], flat, flat[2 * side :]
+    quarter, full = np.float32(0.25), np.float32(BURNT)
     f0, f1, f2, f3, f4, f5 = fit[0], fit[1], fit[2], fit[3], fit[4], fit[5]
     b0, b1, b2, b3, b4, b5 = basis[0], basis[1], basis[2], basis[3], basis[4], basis[5]
     for n in range(count):
         left, top = peaks[n, 0] - reach, peaks[n, 1] - reach
-        for i in range(side):
-            _row(on, channel, top + i, left, lit)
-            row_signal, row_burnt = signal[n, i * side : (i + 1) * side], burnt[n, i * side : (i + 1) * side]
-            for k in range(side):
-                row_signal[k] = lit[k]
-                row_burnt[k] = lit[k] >= BURNT
-            if subtracted:
-                _row(off, channel, top + i + shift_v, left + shift_u, upper)
-                _row(off, channel, top + i + shift_v + 1, left + shift_u, lower)
-                moved, upper_next, lower_next = still[i], upper[1:], lower[1:]
+        _square(flat_on, on.shape, channel, left, top, side, lit)
+        light, lost, ground, steep = signal[n], burnt[n], background[n], slope2[n]
+        for k in range(size):
+            light[k] = lit[k]
+            lost[k] = lit[k] >= full
+        if subtracted:
+            _square(flat_off, off.shape, channel, left + shift_u, top + shift_v, wide, raw)
+            for k in range(wide * side):
+                high = raw[k] + part_u * (right[k] - raw[k])
+                low = under[k] + part_u * (across_under[k] - under[k])
+                moved[k] = high + part_v * (low - high)
+            for i in range(side):
                 for k in range(side):
-                    high = upper[k] + part_u * (upper_next[k] - upper[k])
-                    low = lower[k] + part_u * (lower_next[k] - lower[k])
-                    moved[k] = high + part_v * (low - high)
-        light = signal[n]
-        if not subtracted:
+                    flat[i * side + k] = moved[i * wide + k]
+        else:
             _plane_through_border(light, flat, side)
         c0, c1, c2 = np.float32(0), np.float32(0), np.float32(0)
         c3, c4, c5 = np.float32(0), np.float32(0), np.float32(0)
@@ -108,34 +110,40 @@ def _differences(
             c5 += f5[k] * value
         for k in range(size):
             rest[k] = flat[k] - (b0[k] * c0 + b1[k] * c1 + b2[k] * c2 + b3[k] * c3 + b4[k] * c4 + b5[k] * c5)
-        about, ground = np.float32(0), background[n]
+        about = np.float32(0)
         for k in range(size):
             ground[k] = rest[k]
             about += rest[k] * rest[k]
-        for i in range(side):
-            above, here, below = still[max(i - 1, 0)], still[i], still[min(i + 1, side - 1)]
-            before, after, steep = here[:-2], here[2:], slope2[n, i * side : (i + 1) * side]
-            middle, over, under = steep[1:], above[1:], below[1:]
-            for k in range(side - 2):
-                across, down = after[k] - before[k], under[k] - over[k]
-                middle[k] = quarter * (across * across + down * down)
-            for k, across in ((0, here[1] - here[0]), (side - 1, here[side - 1] - here[side - 2])):
-                steep[k] = quarter * (across * across + (below[k] - above[k]) ** 2)
+        inner = steep[side:]
+        for k in range(size - 2 * side):
+            across, down = ahead[k] - behind[k], below[k] - over[k]
+            inner[k] = quarter * (across * across + down * down)
+        for i in range(side):  # the border has no neighbours outside
+            for row, column in ((0, i), (side - 1, i), (i, 0), (i, side - 1)):
+                a, b = max(row - 1, 0) * side + column, min(row + 1, side - 1) * side + column
+                c, d = row * side + max(column - 1, 0), row * side + min(column + 1, side - 1)
+                steep[row * side + column] = quarter * ((flat[d] - flat[c]) ** 2 + (flat[b] - flat[a]) ** 2)
         variances[n, 0] = about / (size - 6)
         variances[n, 1] = _border_roughness(light, side)
 
 
 @compiled
-def _row(image: Image, channel: int, v: int, left: int, values: Floats) -> None:
-    """The pixels of a row from a column on, of one channel; the border continues outward."""
-    height, width = image.shape[0], image.shape[1]
-    row = image[min(max(v, 0), height - 1)]
-    if left >= 0 and left + len(values) <= width:
-        for k in range(len(values)):
-            values[k] = row[left + k, channel]
-    else:
-        for k in range(len(values)):
-            values[k] = row[min(max(left + k, 0), width - 1), channel]
+def _square(
+    image: Image, size: tuple[int, int, int], channel: int, left: int, top: int, side: int, values: Floats
+) -> None:
+    """The pixels of a square from (left, top) on, row by row, of one channel of an image of some size (h, w, c), flat;
+    the border continues outward."""
+    height, width, channels = size
+    if left >= 0 and top >= 0 and left + side <= width and top + side <= height:
+        for i in range(side):
+            start, to = ((top + i) * width + left) * channels + channel, i * side
+            for k in range(side):
+                values[to + k] = image[start + channels * k]
+        return
+    for i in range(side):
+        start, to = min(max(top + i, 0), height - 1) * width, i * side
+        for k in range(side):
+            values[to + k] = image[(start + min(max(left + k, 0), width - 1)) * channels + channel]
 
 
 @compiled

@@ -12,19 +12,19 @@ from vision.compiled import compiled
 from vision.dots import Spots
 from vision.spot_light import BURNT
 from vision.surface_kernels import solve
-from vision.workspace import lent
 
 Array = NDArray[Any]  # of floats
 
 REACH = 5  # px, half the square around a spot
 
 
-def without_spots(on: Image, off: Image | None, spots: Spots) -> Image:
-    """A copy of the laser-on image's tones (h, w, c) without its spots: painted over from the laser-off image or its
-    tones, moved as `spots.motion` says; without one, each spot as fitted to its surroundings is taken away. It is lent
-    for one look."""
-    clean = lent("clean", on.shape, np.uint8)
-    np.copyto(clean, on)
+def without_spots(on: Image, off: Image | None, spots: Spots, room: Image | None = None) -> Image:
+    """The laser-on image's tones (h, w, c) without its spots: painted over from the laser-off image or its tones, moved
+    as `spots.motion` says; without one, each spot as fitted to its surroundings is taken away. room (h, w, c): where to
+    write them, which may be the tones themselves; else they are copied."""
+    clean = np.empty(on.shape, np.uint8) if room is None else room
+    if clean is not on:
+        np.copyto(clean, on)
     if len(spots) == 0:
         return clean
     if off is not None:
@@ -35,7 +35,7 @@ def without_spots(on: Image, off: Image | None, spots: Spots) -> Image:
             spots.motion,
         )
     else:
-        _take_away(clean, np.ascontiguousarray(on), spots.uv, spots.shape)
+        _take_away(clean, np.array(on, order="C"), spots.uv, spots.shape)
     return clean
 
 

@@ -36,8 +36,69 @@ def solve(matrix: Array, right: Array) -> None:
 
 
 @compiled
-def local_planes(terms: Array, values: Array, sigma: Array, planes: Array) -> None:
-    """Write planes (n, 3): least squares through each point and its nearest neighbours. terms (n, 3) = 1, y, z."""
+def median(values: Array) -> float:
+    """The median of a few values (n,)."""
+    count = len(values)
+    ordered = np.empty(count)
+    for k in range(count):
+        value, place = values[k], k
+        while place > 0 and ordered[place - 1] > value:
+            ordered[place] = ordered[place - 1]
+            place -= 1
+        ordered[place] = value
+    result: float = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
+    return result
+
+
+@compiled
+def consensus(terms: Array, values: Array, sigma: Array, steep: float, start: Array) -> None:
+    """Write start (3,): the plane through some point and its neighbours on which most points lie; of two such planes
+    that share few points, the nearer one if it has at least a third as many.
+
+    terms (n, 6), of which 1, y, z count. steep: slope over inverse depth from which a plane rather joins what stands
+    one behind the other, as a standard deviation."""
+    count = len(terms)
+    planes, agrees = np.empty((count, 3)), np.empty((count, count), np.bool_)
+    _local_planes(terms, values, sigma, planes)
+    _agreement(terms, values, sigma, planes, agrees)
+    score, depth, size = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
+    best = 0
+    for n in range(count):
+        for m in range(count):
+            if agrees[n, m]:
+                size[n] += 1
+                depth[n] += values[m]
+        depth[n] /= max(size[n], 1)
+        lean = np.sqrt(planes[n, 1] ** 2 + planes[n, 2] ** 2) / max(planes[n, 0], 1e-6)
+        score[n] = size[n] * np.exp(-0.5 * (lean / steep) ** 2)
+        if score[n] > score[best]:
+            best = n
+    chosen, most = best, 0.0
+    for n in range(count):
+        if score[n] < max(6.0, score[best] / 3) or depth[n] <= 1.1 * depth[best] or score[n] <= most:
+            continue
+        shared = 0
+        for m in range(count):
+            shared += agrees[n, m] and agrees[best, m]
+        if shared < 0.3 * size[n]:
+            chosen, most = n, score[n]
+    normal = np.zeros((3, 3))
+    start[:] = 0.0
+    for m in range(count):
+        if agrees[chosen, m]:
+            weight = 1 / sigma[m] ** 2
+            for i in range(3):
+                start[i] += weight * terms[m, i] * values[m]
+                for j in range(3):
+                    normal[i, j] += weight * terms[m, i] * terms[m, j]
+    for i in range(3):
+        normal[i, i] += 1e-9
+    solve(normal, start)
+
+
+@compiled
+def _local_planes(terms: Array, values: Array, sigma: Array, planes: Array) -> None:
+    """Write planes (n, 3): least squares through each point and its nearest neighbours. terms (n, 6) = 1, y, z, …"""
     count = len(terms)
     size = min(NEAR, count)
     near, distance = np.empty(size, np.int64), np.empty(size)
@@ -69,7 +130,7 @@ def local_planes(terms: Array, values: Array, sigma: Array, planes: Array) -> No
 
 
 @compiled
-def agreement(terms: Array, values: Array, sigma: Array, planes: Array, agrees: NDArray[np.bool_]) -> None:
+def _agreement(terms: Array, values: Array, sigma: Array, planes: Array, agrees: NDArray[np.bool_]) -> None:
     """Write agrees (n, n): whether point m lies on plane n, roughly."""
     for n in range(len(planes)):
         a, b, c = planes[n, 0], planes[n, 1], planes[n, 2]
@@ -80,9 +141,10 @@ def agreement(terms: Array, values: Array, sigma: Array, planes: Array, agrees: 
 
 @compiled
 def robust(design: Array, values: Array, sigma: Array, held: Array, solution: Array, weight: Array) -> float:
-    """Iteratively reweighted least squares with Cauchy's weights, from solution (k,) on, in place; held (k,) is
-    information toward zero. Written: weight (n,); returned: the cost, squares of at most five sigma."""
-    count, unknowns = design.shape
+    """Iteratively reweighted least squares with Cauchy's weights, from solution (k,) on, in place, of the first k of
+    the terms design (n, 6); held (6,) is information toward zero. Written: weight (n,); returned: the cost, squares of
+    at most five sigma."""
+    count, unknowns = len(design), len(solution)
     normal, right = np.empty((unknowns, unknowns)), np.empty(unknowns)
     for step in range(ITERATIONS):
         loose = 2.5 * (4.0 if step == 0 else 1.5)
