@@ -21,7 +21,7 @@ NEAR = 1.0  # px to each side, between which a step has risen in part
 FAR = (4.0, 6.0, 8.0)  # px to each side, between which it has risen in full
 PLACES = 6  # along an edge, of which at least so many have to be inside the image
 PASSES = 4  # of the robust fit
-APART, SIGMAS = 0.15, 2.5  # by how much the rises of two edges of a blade may differ, besides their standard deviations
+APART, SIGMAS = 0.12, 2.0  # by how much the rises of two edges of a blade may differ, besides their standard deviations
 DRAWN = (0.35, 1.1)  # the rise of an edge as cameras draw it, where no other edge tells
 MOST_EMPTY = 0.15  # of the dots up to a step that may be missing, or the blade ends before it
 
