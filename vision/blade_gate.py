@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from vision.blade_measurement import Measurement, measure, side_of
 from vision.blade_model import BladeModel
-from vision.blade_motion import PLANE, Side
+from vision.blade_motion import PLANE, SLOPES, Side
 from vision.camera import Camera
 from vision.capture import CameraPose
 from vision.estimate import BladeFrame
@@ -74,6 +74,17 @@ class BladeGate:
         model = model.seen_from(self.frame.to_blade(pose.position)).moved(there[0], there[1], settings)
         surface = self._measure(observation, {}, pose, model, tremble, late_s)
         nis, dof = innovation(model, surface, ["surface"])
+        leans: list[str] = []
+        if dof > 1 and not nis < bound(settings.gate, dof):
+            # A bend within the dots makes a surface lean otherwise without being elsewhere; should it go on leaning so,
+            # the slopes, half as certain each time, give way.
+            alone = replace(observation, normal=None)
+            distance = self._measure(alone, {}, pose, model, tremble, late_s)
+            if innovation(model, distance, ["surface"])[0] < bound(settings.gate, 1):
+                leans = ["the surface leans otherwise than the tracked one"]
+                observation, surface = alone, distance
+                model = model.inflated(SLOPES, np.sqrt(3 * np.diag(model.covariance)[SLOPES]))
+                nis, dof = innovation(model, surface, ["surface"])
         if not nis < bound(settings.gate, dof):
             deeper = float(surface.z[0] - surface.H[0] @ model.mean)
             where = "behind" if deeper > 0 else "before"
@@ -82,6 +93,7 @@ class BladeGate:
         # Where the surface was uncertain, edges are linearised around what it has just become.
         around = replace(model, mean=model.corrected(surface.z, surface.R, surface.H).mean)
         edges, reasons = self._sides(observation, pose, around, tremble, late_s)
+        reasons = leans + reasons
         joint = self._measure(observation, edges, pose, around, tremble, late_s)
         if len(edges) == 2 and not width(joint, around) > 0:
             edges, joint = {}, surface
@@ -91,13 +103,18 @@ class BladeGate:
         for side in edges:
             part_nis[side] = innovation(model, joint, ["surface", side])[0] - nis
             if not part_nis[side] < bound(settings.gate, 2):
-                row = joint.parts[side].start
-                off[side] = float(joint.z[row] - joint.H[row] @ model.mean)
+                off[side] = outward(joint, side, model)
                 reasons.append(f"the {side} edge is seen {abs(off[side]):.2f} m from where it is tracked")
+        if len(edges) == 2 and not off:
+            both = innovation(model, joint, ["surface", *edges])[0] - nis
+            if not both < bound(settings.gate, 4):
+                side = max(edges, key=lambda each: part_nis[each])
+                off[side] = outward(joint, side, model)
+                reasons.append(f"the {side} edge is seen too far from the other one")
         parts = ["surface", *(side for side in edges if side not in off)]
         rows = np.concatenate([np.r_[joint.parts[part]] for part in parts])
         nis, dof = innovation(model, joint, parts)
-        used = Measurement(joint.z[rows], joint.H[rows], joint.R[np.ix_(rows, rows)], joint.turning[rows], {})
+        used = joint.of(rows)
         corrected = model.corrected(used.z, used.R, used.H)
         return Judged(UpdateResult(True, tuple(parts), nis, dof, tuple(reasons), part_nis, off), model, corrected, used)
 
@@ -114,9 +131,8 @@ class BladeGate:
         tremble: Tremble,
         late_s: float,
     ) -> Measurement:
-        settings, attitude = self.settings, tremble.attitude
-        found = measure(observation, edges, pose, self.camera, self.frame, model, settings, attitude)
-        return found.before(late_s, tremble.jitter_m, settings) if late_s > 0 else found
+        found = measure(observation, edges, pose, self.camera, self.frame, model, self.settings, tremble)
+        return found.before(late_s, tremble.jitter_m, self.settings) if late_s > 0 else found
 
     def _sides(
         self, observation: BladeObservation, pose: CameraPose, model: BladeModel, tremble: Tremble, late_s: float
@@ -154,6 +170,12 @@ def innovation(model: BladeModel, measurement: Measurement, parts: list[str]) ->
     innovation = measurement.z[rows] - H @ model.mean
     S = H @ model.covariance @ H.T + measurement.R[np.ix_(rows, rows)]
     return float(innovation @ np.linalg.solve(S, innovation)), len(rows)
+
+
+def outward(measurement: Measurement, side: Side, model: BladeModel) -> float:
+    """By how much farther along `across` an edge is measured than tracked (m)."""
+    row = measurement.parts[side].start
+    return float(measurement.z[row] - measurement.H[row] @ model.mean)
 
 
 def width(measurement: Measurement, model: BladeModel) -> float:

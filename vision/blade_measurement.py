@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.blade_lines import image_plane, straightened, stretch
 from vision.blade_model import BladeModel
 from vision.blade_motion import (
     ACROSS_CURVATURE,
@@ -37,16 +39,38 @@ from vision.tracker_settings import TrackerSettings
 Array = NDArray[np.float64]
 
 
+class Noise(Protocol):
+    """What is new in every frame: sigmas of the camera's angles (rad) about its axes, and the shares of what the eye
+    claims of surface and edges."""
+
+    @property
+    def attitude(self) -> tuple[float, float, float]: ...
+
+    @property
+    def surface(self) -> float: ...
+
+    @property
+    def edges(self) -> float: ...
+
+
 @dataclass(frozen=True)
 class Measurement:
     """One linearised measurement (m,): z = H x + noise of covariance R. turning (m, 3): what an error of the camera's
-    angles (rad, camera frame) does to it. parts: name → rows, the surface first."""
+    angles (rad, camera frame) does to it; surface (m, 3 or 1), edges (m, 2 each): what the errors that the eye claims,
+    as independent ones of one sigma each, do. parts: name → rows, the surface first."""
 
     z: Array
     H: Array
     R: Array
     turning: Array
+    surface: Array
+    edges: Array
     parts: dict[str, slice]
+
+    def of(self, rows: NDArray[np.int64]) -> Measurement:
+        """Some rows alone."""
+        seen = self.turning[rows], self.surface[rows], self.edges[rows]
+        return Measurement(self.z[rows], self.H[rows], self.R[np.ix_(rows, rows)], *seen, {})
 
     def before(self, seconds: float, jitter_m: float, settings: TrackerSettings) -> Measurement:
         """The same, taken so long before the state's own time: the vehicle trembled otherwise then."""
@@ -55,28 +79,6 @@ class Measurement:
         H = self.H.copy()
         H[:, TREMBLE] = alike * place
         return replace(self, H=H, R=self.R + (1 - alike**2) * jitter_m**2 * place @ place.T)
-
-
-def image_plane(theta: float, rho: float, camera: Camera) -> Array:
-    """Normal (3,), camera frame, of the plane through the lens whose image is the line (θ, ρ); it points along the
-    line's normal (cos θ, sin θ)."""
-    normal = np.array([np.cos(theta), np.sin(theta)])
-    from_centre = np.array([camera.cx, camera.cy]) - camera.centre
-    return np.array([normal @ from_centre - rho, camera.fx * normal[0], camera.fy * normal[1]])
-
-
-def straightened(edge: Edge, camera: Camera) -> tuple[float, float]:
-    """(θ, ρ) of the edge as a camera without distortion would see it; θ along the edge's outward normal, ρ signed."""
-    theta, rho = edge.line.theta, edge.line.rho
-    if any(camera.distortion):
-        rays = camera.rays(edge.ends + camera.centre)
-        first, last = rays[:, 1:] * (camera.fx, camera.fy) + (camera.cx, camera.cy) - camera.centre
-        along = (last - first) / np.linalg.norm(last - first)
-        normal = np.array([-along[1], along[0]])
-        theta, rho = float(np.arctan2(normal[1], normal[0])), float(normal @ first)
-    if edge.outward @ (np.cos(theta), np.sin(theta)) < 0:
-        theta, rho = theta + np.pi, -rho
-    return theta, rho
 
 
 def look_at(pose: CameraPose, frame: BladeFrame, model: BladeModel, largest_angle: float = np.deg2rad(65)) -> Array:
@@ -109,7 +111,7 @@ def measure(
     frame: BladeFrame,
     model: BladeModel,
     settings: TrackerSettings,
-    attitude: float,
+    noise: Noise,
 ) -> Measurement:
     """The observation's plane (or distance alone) and edges as one measurement of the model's state, linearised around
     it.
@@ -117,8 +119,7 @@ def measure(
     An edge in the image is a plane through the lens; where it cuts the *modelled* surface lies the measured edge, so
     that its rows depend on the state's surface too, and on how far behind it the edge of a round blade lies. A line
     fitted to a curved edge has the edge's slope where the fitted stretch has its middle, not at the reference; the same
-    holds for the plane and the dots. Errors of the camera's angles, of sigma `attitude` (rad), are common to all
-    rows.
+    holds for the plane and the dots. Errors of the camera's angles are common to all rows.
     """
     assert observation.distance_m is not None
     sides = list(edges)
@@ -131,12 +132,7 @@ def measure(
     lines = np.array([straightened(edges[side], camera) for side in sides]).reshape(-1)
     seen = np.concatenate([surface, lines, np.zeros(3)])
     size = len(surface)
-    noise = np.zeros((len(seen), len(seen)))
-    noise[:size, :size] = surface_covariance
-    for i, side in enumerate(sides):
-        rows = slice(size + 2 * i, size + 2 * i + 2)
-        noise[rows, rows] = np.diag([edges[side].sigma_theta ** 2, edges[side].sigma_rho_px ** 2])
-    noise[-3:, -3:] = np.eye(3) * attitude**2
+    claimed = [(edges[side].sigma_theta, edges[side].sigma_rho_px) for side in sides]
 
     camera_to_blade = frame.rotation @ pose.rotation
     lens = frame.to_blade(pose.position)
@@ -200,29 +196,16 @@ def measure(
         parts[side] = rows
     if size == 1:
         H[0, PLANE] -= by_plane[0]
-    R = by_seen @ noise @ by_seen.T + np.diag(np.square(left_out))
+    turning = by_seen[:, -3:]
+    by_surface = by_seen[:, :size] @ np.linalg.cholesky(surface_covariance)
+    by_edges = by_seen[:, size:-3] * np.array(claimed).reshape(-1)
+    new = np.hstack([by_surface * noise.surface, by_edges * noise.edges, turning * noise.attitude])
+    R = new @ new.T + np.diag(np.square(left_out))
     z = value.copy()
     z[size:] -= by_plane[size:] @ plane
     if size == 1:
         z[0] -= by_plane[0] @ plane
-    return Measurement(z, H, R, by_seen[:, -3:], parts)
-
-
-def stretch(edge: Edge, camera: Camera, rotation: Array, lens: Array, model: BladeModel) -> tuple[float, float]:
-    """(station of the middle, length along the span) in metres of the stretch of an edge that was seen, where it lies
-    on the modelled surface; the reference's station and no length where it does not.
-
-    rotation (3, 3), lens (3,): camera to blade coordinates.
-    """
-    depth, along, across = model.mean[PLANE]
-    rays = camera.rays(edge.ends + camera.centre) @ rotation.T
-    gradient = np.array([-along, -across, 1.0])
-    closing = rays @ gradient
-    behind = (np.array([model.station, model.offset, depth]) - lens) @ gradient
-    if not (closing > 0.1).all() or behind <= 0:
-        return model.station, 0.0
-    stations = lens[0] + rays[:, 0] * behind / closing
-    return float(stations.mean()), float(np.ptp(stations))
+    return Measurement(z, H, R, turning, by_surface, by_edges, parts)
 
 
 def small_rotation(angles: Array) -> Array:

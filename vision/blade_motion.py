@@ -21,6 +21,7 @@ Side = Literal["leading", "trailing"]
 SIZE: Final = 20
 DEPTH, DEPTH_SLOPE, ACROSS_SLOPE = 0, 1, 2
 PLANE: Final = slice(0, 3)
+SLOPES: Final = slice(1, 3)
 EDGE: Final[dict[Side, slice]] = {"leading": slice(3, 5), "trailing": slice(5, 7)}
 BLADE: Final = slice(0, 7)
 DEPTH_CURVATURE, TWIST, ACROSS_CURVATURE = 7, 8, 11
@@ -51,7 +52,12 @@ def curvature_sigmas(station: float, settings: TrackerSettings) -> dict[int, flo
         EDGE_CURVATURE["trailing"]: settings.trailing_curvature,
         ACROSS_CURVATURE: settings.across_curvature,
     }
-    return {value: float(np.interp(station, settings.round_within_m, pair)) for value, pair in pairs.items()}
+    return {value: between(station, pair, settings) for value, pair in pairs.items()}
+
+
+def between(station: float, pair: tuple[float, float], settings: TrackerSettings) -> float:
+    """What is `pair` near the root and farther out, at a station: by the same share from one metre to the next."""
+    return float(np.exp(np.interp(station, settings.round_within_m, np.log(pair))))
 
 
 def alike_m(station: float, settings: TrackerSettings) -> float:
@@ -66,7 +72,7 @@ def alike_across_m(station: float, settings: TrackerSettings) -> float:
 
 def recess_sigma(station: float, settings: TrackerSettings) -> float:
     """Sigma (m) of how far behind the surface an edge lies."""
-    return float(np.interp(station, settings.round_within_m, settings.recess_m))
+    return between(station, settings.recess_m, settings)
 
 
 def led_to(travel: float, alike: float) -> tuple[float, float, float]:

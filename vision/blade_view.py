@@ -26,6 +26,7 @@ def view(
     camera: Camera,
     stamp_s: float,
     ages: Mapping[str, float],
+    lasting_m: float,
     settings: TrackerSettings,
 ) -> BladeEstimate:
     """The estimate at the model's reference point, which must lie where the camera looks (see `look_at`).
@@ -44,7 +45,7 @@ def view(
     steepness = max(float(axis @ gradient), 0.1)
     distance = float(np.linalg.norm(np.array([model.station, model.offset, shown.mean[DEPTH]]) - lens))
     together = float(np.interp(model.station, settings.round_within_m, settings.dots_per_m)) * distance**2
-    left_out = np.square([settings.surface_sigma_m, together]).sum()
+    left_out = np.square([settings.surface_sigma_m, together, lasting_m]).sum()
     distance_sigma = float(np.sqrt(shown.covariance[DEPTH, DEPTH] + left_out)) / steepness
     seen = {side: ages[side] for side in SIDES if side in ages}
     point = frame.to_ned(here)

@@ -58,8 +58,9 @@ class BladeTracker:
         self._challenger: BladeModel | None = None
         self._challenges = 0
         self._challenged_s = -np.inf
-        self._tremble = Tremble(self.settings.claimed_jitter_m, self.settings.claimed_attitude)
+        self._tremble = Tremble.claimed(self.settings)
         self._stamp_s = -np.inf
+        self._lasting_m = 0.0
         self._late_s: list[float] = []
         self._taken_s: deque[float] = deque(maxlen=32)
         self._seen_s: dict[str, float] = {}
@@ -104,7 +105,7 @@ class BladeTracker:
             return None
         seen_s = {p: s for p, s in self._seen_s.items() if p not in impossible(model, self._seen_s, self.settings)}
         ages = {part: max(stamp_s - seen, 0.0) for part, seen in seen_s.items()}
-        return view(model, self.frame, pose, self.camera, stamp_s, ages, self.settings)
+        return view(model, self.frame, pose, self.camera, stamp_s, ages, self._lasting_m, self.settings)
 
     def update(self, observation: BladeObservation, pose: CameraPose) -> UpdateResult:
         """Use an observation taken from `pose` at its own stamp (6.3 to 6.7), also when a later one came first.
@@ -134,6 +135,8 @@ class BladeTracker:
             self._model = model
             return self._challenge(observation, pose, judged.result.reasons)
         self._tremble = self._tremble.learnt(judged.before, judged.used, seconds, self.settings)
+        lasting = np.sqrt(max(1 - self._tremble.surface**2, 0.0))
+        self._lasting_m = float(lasting * (observation.distance_sigma_m or 0.0))
         self._model = judged.after
         self._challenger, self._challenges = None, 0
         for part in judged.result.parts:
