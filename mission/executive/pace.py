@@ -12,7 +12,7 @@ from mission.executive.clock import WallClock
 CYCLE_S = 0.35  # mission seconds that a cycle of vision may take on the average before time is slowed down
 SLOWEST = 1.0
 EASE = 1.1  # faster again by at most this factor a cycle
-STEP = 0.1  # smaller changes of the speed are not worth making
+STEP = 0.05  # of the speed: less than EASE raises it by; smaller changes are not worth making
 PERIOD_S = 0.05
 
 
