@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import wrap
+from mission.behaviours.motion import FRESH_S, wrap
 
 if TYPE_CHECKING:
     from flight.guidance.follow import FollowCommand
@@ -41,9 +41,9 @@ async def align_gimbal(services: Services, parameters: AlignGimbal) -> str:
         pose = services.autopilot.telemetry.pose
         error = np.hypot(wrap(float(pose.gimbal[0]) - command.gimbal_yaw), pose.gimbal[1] - command.gimbal_pitch)
         side = following.side(estimate)
-        seen = side is not None and side.age_s < 0.6
+        seen = side is not None and side.age_s < FRESH_S
         services.progress.text = f"gimbal {np.degrees(error):.1f}° off, edge {'seen' if seen else 'not seen'}"
-        return bool(seen and error < np.deg2rad(parameters.tolerance_deg) and estimate.age_s < 0.6)
+        return bool(seen and error < np.deg2rad(parameters.tolerance_deg) and estimate.age_s < FRESH_S)
 
     await following.hold(squarely, parameters.steady_s)
     return "aligned"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import approach, fly_to
+from mission.behaviours.motion import FRESH_S, approach, fly_to
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,7 +29,6 @@ class ApproachRoot(Parameters):
 OVERLAP_M = 1.5  # of a pass that goes on with what was flown of it before
 TIP_MARGIN_M = 1.5  # so far inside the tip there is still enough blade to be found
 INSIDE_M = 0.5  # from the edge, so that there is a surface to measure
-FRESH_S = 1.0  # an older estimate does not lead any nearer
 SEEN_S = 1.0  # the blade must have been tracked without a break for so long before the approach relies on it
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 LEASH_S = 2.5  # the target runs at most this far ahead of the vehicle, in seconds of the wanted speed
 YAW_RATE = math.radians(30.0)
+FRESH_S = 1.0  # what was seen less long ago is there: two looks of an eye at 2 Hz
 
 
 def wrap(angle: float) -> float:

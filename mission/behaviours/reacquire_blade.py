@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import line_of_sight, stay
+from mission.behaviours.motion import FRESH_S, line_of_sight, stay
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -36,7 +36,7 @@ async def reacquire_blade(services: Services, parameters: ReacquireBlade) -> str
     started, seen_s = services.clock.now(), None
     async for now in services.ticks(10.0):
         estimate = services.perception.estimate()
-        fresh = estimate is not None and estimate.age_s < 0.6
+        fresh = estimate is not None and estimate.age_s < FRESH_S
         seen_s = (seen_s if seen_s is not None else now) if fresh else None
         if seen_s is not None and now - seen_s >= parameters.steady_s:
             return "reacquired"

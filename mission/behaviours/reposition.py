@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
+from mission.behaviours.motion import FRESH_S
 
 if TYPE_CHECKING:
     from flight.guidance.follow import FollowCommand
@@ -39,7 +40,7 @@ async def reposition(services: Services, parameters: Reposition) -> str:
 
     def in_view(estimate: BladeEstimate, command: FollowCommand) -> bool:
         side = following.side(estimate)
-        seen = side is not None and (side.age_s < 0.6 or (side.age_s < BRIDGE_S and side.offset_sigma_m < SURE_M))
+        seen = side is not None and (side.age_s < FRESH_S or (side.age_s < BRIDGE_S and side.offset_sigma_m < SURE_M))
         services.progress.text = f"{parameters.side} edge {'in view' if seen else 'not in view yet'}"
         return seen
 

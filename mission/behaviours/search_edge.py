@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field
 
 from mission.behaviours.behaviour import Parameters, behaviour
-from mission.behaviours.motion import approach, stay
+from mission.behaviours.motion import FRESH_S, approach, stay
 
 if TYPE_CHECKING:
     from mission.executive.services import Services
@@ -50,7 +50,7 @@ async def search_edge(services: Services, parameters: SearchEdge) -> str:
             services.autopilot.point_gimbal(here.yaw, 0.0)
             estimate = services.perception.estimate()
             side = None if estimate is None else getattr(estimate, parameters.side)
-            if side is not None and estimate is not None and side.age_s < 0.4 and estimate.age_s < 0.4:
+            if side is not None and estimate is not None and max(side.age_s, estimate.age_s) < FRESH_S:
                 return "found"
             if np.linalg.norm(carrot - goal) < 0.01:
                 arrived_s = now if arrived_s is None else arrived_s
