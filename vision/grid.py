@@ -30,7 +30,8 @@ LEAST_MISFIT = 0.01  # of the grid's spacing, by which the best calibrated dot i
 NEIGHBOURS = 2  # rows and columns over which a surface holds together
 RELIEF = 0.055  # relative change of inverse depth from one dot to the next on one surface
 LEAST_SURFACE = 4
-SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade
+SURFACE_SHARE = 0.25  # of the largest surface's dots: a nearer surface with as many is the blade,
+SURE_SURFACE = 8  # or one of so many dots, which are never whole rows and columns of the laser by chance
 AMBIGUOUS = 0.6  # support of another reading, over that of the best, from which neither is believed
 MOST_PAIRS = 64  # that one spot may be part of
 
@@ -198,7 +199,7 @@ def nearest_surface(matches: Matches, least: int) -> Matches:
         return matches
     count = np.bincount(matches.surface)
     depth = medians(matches.inverse_depth, matches.surface)
-    enough = count >= max(least, SURFACE_SHARE * count.max())
+    enough = count >= max(least, min(SURFACE_SHARE * count.max(), SURE_SURFACE))
     if not enough.any():
         return matches.take(matches.surface == 0)
     return matches.take(matches.surface == int(np.argmax(np.where(enough, depth, 0))))
