@@ -9,7 +9,8 @@ from itertools import pairwise
 from mission.executive.events import EVENTS
 from mission.language.cycles import components, cyclic, shortest_cycle
 from mission.language.document import enclosing
-from mission.language.exploration import LANDS, Edge, Exploration, Situation, behaviour_of
+from mission.language.exploration import LANDS, Edge, Exploration, Situation
+from mission.language.happening import behaviour_of
 
 FOR_EVER = float("inf")
 

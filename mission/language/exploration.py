@@ -9,22 +9,20 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
-from mission.behaviours.behaviour import Behaviour, behaviours
-from mission.executive.events import EVENTS, Event, Severity
+from mission.executive.events import EVENTS
 from mission.language.document import Mission, State, Transition, enclosing
+from mission.language.happening import happening, possible
 from mission.language.remembering import Memory, Remembering, remembering
 
 TAKES_OFF = "take_off"
 LANDS = {"land": frozenset({"landed"})}
-_BY_REQUEST = ("step", "skip")
 _MOST = 4000  # situations that are told apart by what is remembered
 
 
-@dataclass(frozen=True, order=True)
-class Situation:
+class Situation(NamedTuple):
     """A leaf, whether the vehicle may be in the air on entering it, and what is remembered: composite → leaf."""
 
     leaf: str
@@ -32,8 +30,7 @@ class Situation:
     memory: Memory = ()
 
 
-@dataclass(frozen=True)
-class Edge:
+class Edge(NamedTuple):
     """One step: an event that happens in a situation, what answers it, and where it leads."""
 
     source: Situation
@@ -58,6 +55,7 @@ class Exploration:
         self._skips = [Transition("skip", path, "") for path, state in mission.states.items() if state.entry]
         self._reached: frozenset[str] = frozenset()
         self._remembering: Remembering | None = None
+        self._answers: dict[str, tuple[tuple[str, Transition, bool], ...]] = {}
         self._explore()
 
     @property
@@ -137,14 +135,15 @@ class Exploration:
             known = frozenset(situation.leaf for situation in self.came_by)
             self._reached = known
             self._everything()
+            if all(edge.transition.history is None for edge in self.all_edges()):
+                return
             if known == {situation.leaf for situation in self.came_by}:
                 break
-        if any(edge.transition.history is not None for edge in self.all_edges()):
-            free = self.came_by, self.edges
-            entries = frozenset(self.mission.leaf(skip.target) for skip in self._skips)
-            self._remembering = remembering(self.mission, self.all_edges(), entries)
-            if not self._everything(_MOST):
-                self.came_by, self.edges = free
+        free = self.came_by, self.edges
+        entries = frozenset(self.mission.leaf(skip.target) for skip in self._skips)
+        self._remembering = remembering(self.mission, self.all_edges(), entries)
+        if not self._everything(_MOST):
+            self.came_by, self.edges = free
 
     def _everything(self, most: int | None = None) -> bool:
         """Explore from the beginning; False where that leads to more situations than wanted."""
@@ -169,24 +168,33 @@ class Exploration:
         waiting = deque([first])
         while waiting and (most is None or len(self.came_by) <= most):
             situation = waiting.popleft()
-            self.edges[situation] = tuple(self._steps(situation))
+            self.edges[situation] = self._steps(situation)
             for edge in self.edges[situation]:
                 if edge.target not in self.came_by:
                     self.came_by[edge.target] = edge
                     waiting.append(edge.target)
 
-    def _steps(self, situation: Situation) -> Iterator[Edge]:
-        if self.state(situation).final is not None:
-            return
-        for name, origin in happening(self.mission, situation.leaf):
-            for transition in possible(self.mission, origin, name):
-                airborne = self._airborne_after(situation, name)
-                for leaf, memory in self._ends(situation, transition):
-                    yield Edge(situation, name, transition, Situation(leaf, airborne, memory))
+    def _steps(self, situation: Situation) -> tuple[Edge, ...]:
+        flying, found = self.flying(situation), []
+        ends: dict[tuple[int, bool], tuple[Situation, ...]] = {}  # many events are answered by one transition
+        for name, transition, lands in self._answered(situation.leaf):
+            asked = id(transition), flying and not lands
+            if asked not in ends:
+                ends[asked] = tuple(Situation(leaf, asked[1], mem) for leaf, mem in self._ends(situation, transition))
+            found += [Edge(situation, name, transition, target) for target in ends[asked]]
+        return tuple(found)
 
-    def _airborne_after(self, situation: Situation, event: str) -> bool:
-        landed = LANDS.get(self.state(situation).do or "", frozenset())
-        return self.flying(situation) and event not in landed
+    def _answered(self, leaf: str) -> tuple[tuple[str, Transition, bool], ...]:
+        """What can happen in a leaf, what may answer it, and whether the vehicle has landed by it."""
+        known, state = self._answers.get(leaf), self.mission.states[leaf]
+        if known is None:
+            landed = LANDS.get(state.do or "", frozenset())
+            known = self._answers[leaf] = tuple(
+                (name, transition, name in landed)
+                for name, origin in (happening(self.mission, leaf) if state.final is None else ())
+                for transition in possible(self.mission, origin, name)
+            )
+        return known
 
     def _after(self, situation: Situation, transition: Transition) -> tuple[str, Memory]:
         if self._remembering is None:
@@ -203,48 +211,3 @@ class Exploration:
         if transition.history == "shallow":
             leaves = {mission.leaf(f"{target}.{leaf[len(target) + 1 :].split('.')[0]}") for leaf in leaves}
         yield from ((leaf, ()) for leaf in sorted(leaves - {first}))
-
-
-def happening(mission: Mission, leaf: str) -> Iterator[tuple[str, str]]:
-    """Everything that can happen in a leaf: (event, the state that it is about)."""
-    state = mission.states[leaf]
-    behaviour, outcomes = behaviour_of(state), outcomes_of(state)
-    for event in EVENTS.values():
-        if event.name in ("timed_out", *_BY_REQUEST) or (event.name in _ABOUT_BEHAVIOURS and behaviour is None):
-            continue
-        if event.name == "failed" and "failed" not in outcomes:
-            continue
-        yield event.name, leaf
-    for outer in enclosing(leaf):
-        if mission.states[outer].timeout_s is not None:
-            yield "timed_out", outer
-    for outcome in outcomes:
-        if outcome not in EVENTS:
-            yield outcome, leaf
-
-
-_ABOUT_BEHAVIOURS = ("behaviour_failed", "behaviour_stuck")
-
-
-def possible(mission: Mission, origin: str, event: str) -> Iterator[Transition]:
-    """Transitions that may answer an event: up to the first that always does, as guards and retries can pass it on."""
-    for transition in mission.handlers(origin, event):
-        yield transition
-        if not transition.guarded and transition.retries is None:
-            return
-
-
-def behaviour_of(state: State) -> Behaviour | None:
-    """What a state does."""
-    return behaviours().get(state.do) if state.do else None
-
-
-def outcomes_of(state: State) -> Mapping[str, str]:
-    """How what a state does can end, with the parameters that it is given: name → what it means."""
-    behaviour = behaviour_of(state)
-    return behaviour.outcomes_with(state.parameters) if behaviour is not None else {}
-
-
-def safety_events() -> tuple[Event, ...]:
-    """Events of the table that are about safety: those that must not go unheard in the air."""
-    return tuple(event for event in EVENTS.values() if event.severity in (Severity.SAFETY, Severity.CRITICAL))

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from mission.language.cycles import components, cyclic, shortest_cycle
 from mission.language.document import enclosing
 from mission.language.endings import Endings, Failure
-from mission.language.exploration import Exploration, Situation, behaviour_of
+from mission.language.exploration import Exploration, Situation
+from mission.language.happening import behaviour_of
 from mission.language.invariants import Invariant
 
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from mission.executive.events import Event
 from mission.language.document import Mission
 from mission.language.endings import Endings, Failure, Way
-from mission.language.exploration import Edge, Exploration, Situation, behaviour_of, safety_events
+from mission.language.exploration import Edge, Exploration, Situation
+from mission.language.happening import behaviour_of, safety_events
 from mission.language.invariant_proof import InvariantProof, invariant_proof
 
 

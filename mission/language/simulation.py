@@ -21,7 +21,7 @@ from mission.executive.timing import Timing, Waiting
 from mission.language import semantics
 from mission.language.diagnostics import near_or_choices
 from mission.language.document import Mission, Transition, enclosing, load
-from mission.language.exploration import behaviour_of, outcomes_of
+from mission.language.happening import behaviour_of, outcomes_of
 from mission.language.semantics import Configuration, Step
 
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from mission.executive.events import EVENTS
 from mission.language.diagnostics import Diagnostic, choices, suggestion
 from mission.language.document import Transition, enclosing
-from mission.language.exploration import Exploration, behaviour_of, outcomes_of
+from mission.language.exploration import Exploration
+from mission.language.happening import behaviour_of, outcomes_of
 
 
 def unanswered_outcomes(exploration: Exploration) -> Iterator[Diagnostic]:
@@ -62,7 +63,7 @@ def shadowed(exploration: Exploration) -> Iterator[Diagnostic]:
 
 def _happens(exploration: Exploration, transition: Transition) -> bool:
     from mission.executive.events import fallbacks
-    from mission.language.exploration import happening
+    from mission.language.happening import happening
 
     return any(
         transition.event in fallbacks(name)

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from mission.executive.events import Event, fallbacks
 from mission.language.diagnostics import Diagnostic
 from mission.language.document import Mission, enclosing
-from mission.language.exploration import Exploration, Situation, behaviour_of, happening, safety_events
+from mission.language.exploration import Exploration, Situation
+from mission.language.happening import behaviour_of, happening, safety_events
 
 
 def unanswered_events(exploration: Exploration) -> Iterator[Diagnostic]:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from mission.executive.events import EVENTS
 from mission.language import semantics
 from mission.language.document import load
-from mission.language.exploration import Exploration, safety_events
+from mission.language.exploration import Exploration
+from mission.language.happening import safety_events
 from mission.language.loading import examine
 from mission.language.scenario_report import report, shown
 from mission.language.semantics import Configuration
