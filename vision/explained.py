@@ -60,7 +60,8 @@ def absent_dots(
     there one was overlooked."""
     points = expected_points(laser, surface.depth_m, surface.slope)
     free = np.isfinite(points[:, 0])
-    free[blade.row * laser.columns + blade.column] = False
+    seen = matches.take(matches.surface == blade.surface[0])  # also where it curves away from the fitted surface
+    free[seen.row * laser.columns + seen.column] = False
     points = points[free]
     inside = np.ones(len(points), bool)
     pixels = []

@@ -22,6 +22,7 @@ FAR = (4.0, 6.0, 8.0)  # px to each side, between which it has risen in full
 PLACES = 6  # along an edge, of which at least so many have to be inside the image
 PASSES = 4  # of the robust fit
 APART, SIGMAS = 0.12, 2.0  # by how much the rises of two edges of a blade may differ, besides their standard deviations
+CLEARER = 2.0  # times the step of another edge, from which that one tells nothing: its own surroundings blur it
 DRAWN = (0.35, 1.1)  # the rise of an edge as cameras draw it, where no other edge tells
 MOST_EMPTY = 0.15  # of the dots up to a step that may be missing, or the blade ends before it
 
@@ -83,6 +84,8 @@ def like_an_edge(edge: Candidate, tones: Image, typical: Candidate | None) -> bo
     rise = None if edge.empty > MOST_EMPTY else rise_of(edge, tones)
     if rise is None:
         return False
+    if typical is not None and edge.step > CLEARER * typical.step:
+        typical = None
     usual = None if typical is None else rise_of(typical, tones, rise.reach)
     if usual is None or usual.reach != rise.reach:
         return DRAWN[0] - SIGMAS * rise.sigma < rise.share < DRAWN[1] + SIGMAS * rise.sigma
