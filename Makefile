@@ -3,8 +3,9 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 MISSION ?= missions/v80_blade.yaml
-# compiles inner loops, so that neither the first flight nor the first test waits for that
-READY  := $(BIN)/python -m mission.executive.ready missions/v80_blade.yaml
+# compiles the program and its inner loops, so that neither the first flight nor the first test waits for that
+READY  := $(BIN)/python -m compileall -q mission devices flight vision && \
+          $(BIN)/python -m mission.executive.ready missions/v80_blade.yaml
 
 .PHONY: help run test check schema bench campaign clean
 

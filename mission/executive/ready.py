@@ -38,13 +38,20 @@ def make_ready(world: World | None, geometry: RigGeometry) -> None:
 
 
 def main() -> None:
-    """Make ready for the mission that the command line names."""
+    """Make ready for the mission that the command line names, and for photographs."""
     from mission.executive.belief import rig_geometry
     from mission.executive.simulation import build_world
     from mission.language.document import load
+    from vision.pipeline import observe_single
+    from vision.warm_up import specimen
 
+    print("compiling inner loops: about a minute, once on a machine", flush=True)
     mission = load(Path(sys.argv[1]))
-    make_ready(build_world(mission), rig_geometry(mission.rig, mission.path.parent))
+    geometry = rig_geometry(mission.rig, mission.path.parent)
+    make_ready(build_world(mission), geometry)
+    photograph = specimen(geometry).left_laser
+    assert photograph is not None
+    observe_single(photograph)
 
 
 if __name__ == "__main__":
