@@ -98,7 +98,12 @@ def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherE
     found = _weighed(profile, blade, smooth, noise, other, low[which], high[which])
     # Of fits to one step that which follows more of it is right: a line that starts askew may lose half of it.
     found.sort(key=lambda c: -c.worth - _followed(c) / FOLLOWED_PX)
-    found = [c for k, c in enumerate(found) if not any(_same(c, better) for better in found[:k])]
+    ways = [c.outward.tolist() for c in found]
+    found = [
+        one
+        for k, (one, (x, y)) in enumerate(zip(found, ways, strict=True))
+        if not any(x * ways[b][0] + y * ways[b][1] >= ALIKE and _same(one, found[b]) for b in range(k))
+    ]
     return sorted(found, key=lambda c: -c.worth)
 
 
@@ -109,10 +114,7 @@ def _followed(one: Candidate) -> float:
 
 
 def _same(one: Candidate, other: Candidate) -> bool:
-    """Whether two candidates are the same step: their lines agree where either of them is seen."""
-    (x, y), (other_x, other_y) = one.outward.tolist(), other.outward.tolist()
-    if x * other_x + y * other_y < ALIKE:
-        return False
+    """Whether two candidates that run alike are the same step: their lines agree where either of them is seen."""
     middle = one.outward * one.rho + sum(one.ends) / 2 * one.profile.direction[one.index]
     theirs = other.outward * other.rho + sum(other.ends) / 2 * other.profile.direction[other.index]
     return abs(float(other.outward @ middle) - other.rho) < 3.0 and abs(float(one.outward @ theirs) - one.rho) < 3.0

@@ -14,6 +14,7 @@ from vision.candidates import LEAST_RUN, Candidate
 from vision.capture import Image
 from vision.ending import CLEAR, HOLE, LEAST_SHARE, Ending, Side, fit_ending, side_beside, side_of
 from vision.evidence import Blade
+from vision.surface_kernels import median
 
 Array = NDArray[Any]  # of floats
 
@@ -119,7 +120,7 @@ def _likeliest_spike(candidates: list[Candidate], blade: Blade, size: tuple[int,
     behind."""
     half = (np.array(size) - 1) / 2
     best: Closed | None = None
-    middle = np.median(blade.dots, axis=0)
+    middle = np.array([median(np.ascontiguousarray(blade.dots[:, 0])), median(np.ascontiguousarray(blade.dots[:, 1]))])
     for a, one in enumerate(candidates[:MOST]):
         for two in candidates[a + 1 : MOST]:
             (x, y), (other_x, other_y) = one.outward.tolist(), two.outward.tolist()

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numba
 
+OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -20,7 +21,7 @@ def compiled(function: F) -> F:
     """A function of arrays and numbers as machine code, from its first call on."""
     kernel: F
     try:
-        kernel = numba.njit(cache=True, nogil=True)(function)
+        kernel = numba.njit(cache=True, **OPTIONS)(function)
     except RuntimeError:  # numba found nowhere to keep it
-        kernel = numba.njit(nogil=True)(function)
+        kernel = numba.njit(**OPTIONS)(function)
     return kernel

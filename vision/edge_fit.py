@@ -4,6 +4,7 @@ and how long they err together."""
 from __future__ import annotations
 
 from dataclasses import replace
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from vision.camera import Camera
 from vision.candidates import Candidate
+from vision.edge_fit_kernels import certainty, parabola
 
 Array = NDArray[Any]  # of floats
 
@@ -23,6 +25,13 @@ STEP_PX = 0.015  # standard deviation of a step's place that no scatter shows
 RHO_PX, SLOPE = 0.006, 3e-5  # of a line at best: the camera's own
 LONGEST = 12.0  # how many neighbouring steps at most err together
 PARTS = 5  # of an edge, that are held against each other
+# information about offset, slope and half the bend: what a fit about a focus and one of all alike start with, what is
+# known besides the steps of the latter, and what a fit before an end starts with
+HELD = np.array([1e-6, 1e-6, 1.0 / BEND_HELD**2])
+ALIKE_FITTED = np.array([1e-6, 1e-6, (USUAL_PX / OWN_BEND) ** 2])
+ALIKE_KNOWN = np.array([1e-6, 1e-6, 1 / OWN_BEND**2])
+HELD_BEFORE_END = np.array([1e-4, 1e-4 / 0.05**2, (USUAL_PX / OWN_BEND) ** 2])
+TOLERANCES = np.array([2.0, 1.2, 0.8, 0.8])  # px: how far from the curve steps lose weight, pass by pass
 
 
 def lens_bend(camera: Camera | None, point: Array, normal: Array) -> float:
@@ -46,36 +55,14 @@ def settled(edge: Candidate, alike: bool, half_bend: float = 0.0) -> Candidate:
     use = profile.agrees[k] & (t >= edge.ends[0] - 1) & (t <= edge.ends[1] + 1)
     if use.sum() < 6:
         return edge
-    x = t[use] - focus
+    bend, fitted, known = 0.0, HELD, HELD
+    if alike:
+        bend, fitted, known = 0.5 * float(profile.bend[k]) - half_bend, ALIKE_FITTED, ALIKE_KNOWN
     residual = profile.offset[k][use]
-    weight = np.ones_like(x) if alike else np.exp(-0.5 * (x / FOCUS_PX) ** 2)
-    terms = np.column_stack([np.ones_like(x), x, x * x])
-    if alike:
-        residual = residual + 0.5 * profile.bend[k] * x * x - half_bend * x * x
-        held = np.diag([1e-6, 1e-6, (USUAL_PX / OWN_BEND) ** 2])
-        residual = residual - terms @ np.linalg.solve(terms.T @ terms + held, terms.T @ residual)
-    variance = float((residual**2 * weight).sum() / weight.sum()) + STEP_PX**2
-    lag = float((residual[1:] * residual[:-1]).mean()) / variance
-    together = float(np.clip((1 + lag) / max(1 - lag, 1e-3), 1.0, LONGEST))
-    together = max(together, _wandering(residual, weight, variance))
-    if alike:
-        spread = np.linalg.inv(terms.T @ terms / (variance * together) + np.diag([1e-6, 1e-6, 1 / OWN_BEND**2]))
-    else:
-        held = np.diag([1e-6, 1e-6, 1.0 / BEND_HELD**2])
-        inverse = np.linalg.inv((terms * weight[:, None]).T @ terms + held)
-        spread = variance * together * inverse @ ((terms * (weight**2)[:, None]).T @ terms + held) @ inverse
+    rho, slope = certainty(t[use] - focus, residual, alike, bend, fitted, known, FOCUS_PX, STEP_PX, LONGEST, PARTS)
     slope_sigma, rho_sigma = profile.slope_sigma.copy(), profile.rho_sigma.copy()
-    slope_sigma[k] = np.hypot(np.sqrt(spread[1, 1]), SLOPE)
-    rho_sigma[k] = np.hypot(np.sqrt(spread[0, 0]), RHO_PX)
+    slope_sigma[k], rho_sigma[k] = hypot(slope, SLOPE), hypot(rho, RHO_PX)
     return replace(edge, profile=replace(profile, slope_sigma=slope_sigma, rho_sigma=rho_sigma))
-
-
-def _wandering(residual: Array, weight: Array, variance: float) -> float:
-    """How many steps err together by what parts of an edge err on the mean: one that follows something else for a
-    while errs for longer than neighbours tell."""
-    parts = zip(np.array_split(residual, PARTS), np.array_split(weight, PARTS), strict=True)
-    sums = [(float((r * w).sum()) ** 2 / max(float((w**2).sum()), 1e-9)) for r, w in parts]
-    return float(sum(sums)) / variance / (PARTS - 2)
 
 
 def trimmed(edge: Candidate, toward: Array, station: float, camera: Camera | None = None) -> Candidate:
@@ -92,16 +79,10 @@ def trimmed(edge: Candidate, toward: Array, station: float, camera: Camera | Non
     offset = profile.offset[k] + 0.5 * profile.bend[k] * (t - profile.focus[k]) ** 2
     half_bend = lens_bend(camera, edge.outward * edge.rho + direction * focus, edge.outward)
     offset = offset - half_bend * place**2
-    fit = np.array([float(np.median(offset[use])), 0.0, 0.0])
-    terms = np.column_stack([np.ones_like(place), place, place * place])
-    held = np.diag([1e-4, 1e-4 / 0.05**2, (USUAL_PX / OWN_BEND) ** 2])
-    for tolerance in (2.0, 1.2, 0.8, 0.8):
-        weight = use / (1 + ((offset - terms @ fit) / tolerance) ** 2) ** 2
-        information = (terms * weight[:, None]).T @ terms + held
-        fit = np.linalg.solve(information, (terms * weight[:, None]).T @ offset)
-    turn = float(np.arctan(fit[1]))
+    shift, slope = parabola(place, offset, use, HELD_BEFORE_END, TOLERANCES)
+    turn = float(np.arctan(slope))
     normal = edge.outward * np.cos(turn) - direction * np.sin(turn)
-    point = edge.outward * (edge.rho + fit[0]) + direction * focus
+    point = edge.outward * (edge.rho + shift) + direction * focus
     rho = float(normal @ point)
     moved = replace(profile, normal=profile.normal.copy(), rho=profile.rho.copy(), focus=profile.focus.copy())
     moved.normal[k], moved.rho[k], moved.focus[k] = normal, rho, focus

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from vision.beside_kernels import highest
 from vision.candidates import Candidate
 from vision.capture import Image
-from vision.ending_kernels import fittest, likeliest, summits_over
+from vision.ending_kernels import fittest, likeliest, seen_along, summits_over
 from vision.evidence import Blade
-from vision.lane_kernels import seen_along, seen_in_lanes, steps_in_lanes
+from vision.lane_kernels import seen_in_lanes, steps_in_lanes
 from vision.lines import visible_stretch
 
 Array = NDArray[Any]  # of floats

@@ -14,6 +14,7 @@ Floats = NDArray[Any]
 AROUND = 4  # places about an outline in which its steepest place is sought
 LEAST_SCATTER_PX = 0.7  # of the steepest places about their outline
 STRAY_PX = 1.5  # from a shape to the steps that are its outline
+SLIGHT = 1e-6  # of evidence: what sums in another order may differ by
 LENGTH_HELD = 0.1  # of an outline's reach: what it may be off
 
 
@@ -49,7 +50,7 @@ def likeliest(
     lead = len(until) - count
     best = -np.inf
     uncovered = np.zeros(count + 1, np.int64)  # holes that lie inside from each place on
-    share, total = np.empty(count), np.empty(count)
+    share, total, gain = np.empty(count), np.empty(count), (closed - open_) / lanes
     for k in range(len(reach)):
         uncovered[:] = 0
         for h in range(holes.shape[1]):
@@ -67,6 +68,15 @@ def likeliest(
             continue
         share[low:high] = 0.0
         for lane in range(lanes):
+            if lane % 5 == 4:  # leave out places at both ends that the rest of the lanes could not make the best
+                all_but = open_ + (closed - open_) * (lanes - lane) / lanes
+                while high > low and total[low] + weight[k] * (all_but + gain * share[low]) <= best - near - SLIGHT:
+                    low += 1
+                while (
+                    high > low
+                    and total[high - 1] + weight[k] * (all_but + gain * share[high - 1]) <= best - near - SLIGHT
+                ):
+                    high -= 1
             start, back, row = max(low, shift[k, lane]), shift[k, lane], seen[lane]
             for place in range(start, high):
                 share[place] += row[place - back]
@@ -197,3 +207,21 @@ def fittest(
         if evidence >= most:
             best, best_station, best_sigma, most = k, station, sigma, evidence
     return best, best_station, best_sigma, most
+
+
+@compiled
+def seen_along(
+    t: Floats, agrees: NDArray[np.bool_], start: float, rate: float, seen: float, unseen: float, stations: Floats,
+    evidence: Floats, sums: Floats,
+) -> float:  # fmt: skip
+    """An edge's places t (m,) as stations (m,) = start + rate · t in rising order, what each says for the edge,
+    evidence (m,), as its step agrees or not, and the sums (m + 1,) of that up to each; returned: the greatest sum."""
+    count, most = len(t), 0.0
+    sums[0] = 0.0
+    for m in range(count):
+        k = m if rate * (t[count - 1] - t[0]) >= 0 else count - 1 - m
+        stations[m] = start + rate * t[k]
+        evidence[m] = seen if agrees[k] else unseen
+        sums[m + 1] = sums[m] + evidence[m]
+        most = max(most, sums[m + 1])
+    return most

@@ -13,7 +13,7 @@ from vision.beside_kernels import outermost, shares_agreeing, stretches_beside
 from vision.camera import Camera, StereoPair
 from vision.capture import Image
 from vision.evidence_kernels import line_of_most, longest_runs, median_steps, missing_dots, runs_about
-from vision.lane_kernels import steps_before, steps_between, strongest_across
+from vision.lane_kernels import shares_at_depth, steps_before, steps_between
 from vision.lines import Profiles
 from vision.surface import Surface
 from vision.surface_kernels import median
@@ -24,6 +24,8 @@ FIRST_INWARD, INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 5.0, 3.0, 56, 24
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
 ROUND_M = 1.0  # how far behind the surface before the camera a thick blade's edge may lie
 PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
+PARALLAX_STEP = 0.4  # of a step, what the other eye has to see of it
+LEAST_PARALLAX_PX, LEAST_PLACES = 6.0, 5  # against the far background, and places with a step, that tell depths apart
 PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
 BEYOND_PX = 45.0  # so far past a line missing dots tell that the blade ends there
 RUN_PLACES = 7  # along a line, of which most must show a step
@@ -197,8 +199,7 @@ def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], nois
     NaN where the line's parallax against the far background is too small to tell them apart.
     """
     stereo, surface = other.stereo, other.surface
-    height, width = other.smooth.shape[:2]
-    t, agrees, step = (values[:, ::2] for values in (profile.t, profile.agrees & beside, profile.step))
+    t = profile.t[:, ::2]
     lines, places = t.shape
     points = (profile.normal * profile.rho[:, None])[:, None] + t[..., None] * profile.direction[:, None]
     rays = stereo.left.rays((points + stereo.left.centre).reshape(-1, 2))
@@ -212,14 +213,9 @@ def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], nois
 
     there, deeper = seen_at(1 / inverse), seen_at(1 / inverse + ROUND_M)
     far = stereo.right.project(rays @ stereo.rotation.T).reshape(lines, places, 2)
-    normal = profile.normal[:, None]
-    telling = np.abs(((deeper - far) * normal).sum(axis=2)).mean(axis=1) > 6.0
-    behind = ((deeper - there) * normal).sum(axis=2)
-    first, extent = np.minimum(behind, 0) - PARALLAX_PX, np.abs(behind) + 2 * PARALLAX_PX
-    like = np.empty((lines, places))
-    strongest_across(other.smooth, there, profile.normal, first, extent, PARALLAX_SAMPLES, like)
-    middle = there + (first + extent / 2)[..., None] * normal
-    seen = ((middle > 4) & (middle < (width - 5, height - 5))).all(axis=2) & agrees
-    strong = like > np.maximum(0.4 * np.abs(step), 1.2 * noise)
-    share = (strong & seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
-    return np.asarray(np.where(telling & (seen.sum(axis=1) >= 5), share, np.nan), float)
+    share = np.empty(lines)
+    shares_at_depth(
+        other.smooth, there, deeper, far, profile.normal, profile.step, profile.agrees, beside, PARALLAX_PX,
+        LEAST_PARALLAX_PX, PARALLAX_STEP, 1.2 * noise, LEAST_PLACES, PARALLAX_SAMPLES, share,
+    )  # fmt: skip
+    return share

@@ -14,6 +14,7 @@ from vision.grid import Matches, expected_points, grid_coordinates
 from vision.observation import Dots
 from vision.reduction import to_full
 from vision.surface import Surface
+from vision.surface_kernels import median
 
 Array = NDArray[Any]  # of floats
 
@@ -30,7 +31,7 @@ def explained_dots(left: Spots, rays: Array, matches: Matches, surface: Surface,
     unread[matches.left] = False
     rest = np.flatnonzero(unread)
     if len(matches):
-        rest = rest[left.level[rest] > LEAST_LEVEL * float(np.median(left.level[matches.left]))]
+        rest = rest[left.level[rest] > LEAST_LEVEL * median(left.level[matches.left].astype(float))]
     inverse = surface.inverse_depth(rays[rest])
     rest, inverse = rest[inverse > LEAST_INVERSE], inverse[inverse > LEAST_INVERSE]
     if len(rest):
@@ -78,8 +79,9 @@ def absent_dots(
         unread = np.delete(spots.uv, known, axis=0)
         if len(unread):
             inside &= np.hypot(*(uv[:, None] - unread).transpose(2, 0, 1)).min(axis=1) > BORDER_PX
-    inside &= ~_enclosed(pixels[0], left.uv[blade.left])
-    return np.asarray(pixels[0][inside] - stereo.left.centre, float)
+    outside = pixels[0][inside]
+    outside = outside[~_enclosed(outside, left.uv[blade.left])]
+    return np.asarray(outside - stereo.left.centre, float)
 
 
 def _enclosed(points: Array, dots: Array) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from vision.capture import Image
 from vision.compiled import compiled
 
 Floats = NDArray[Any]
+Flags = NDArray[np.bool_]
 
 
 @compiled
@@ -63,24 +64,38 @@ def steps_between(image: Image, points: Floats, least: float, most: float, share
 
 
 @compiled
-def strongest_across(
-    image: Image, at: Floats, normals: Floats, first: Floats, extent: Floats, samples: int, strongest: Floats
-) -> None:
-    """The greatest step, written to strongest (k, m), on samples across each of k lines at places at (k, m, 2) px of an
-    image (h, w, c): along its normal (k, 2) from first (k, m) px over an extent (k, m); the mean of three places'
-    steps, each of the tone that changes most."""
-    lines, places = strongest.shape
+def shares_at_depth(
+    image: Image, near: Floats, deeper: Floats, far: Floats, normals: Floats, steps: Floats, agrees: Flags,
+    beside: Flags, about: float, apart: float, part: float, least: float, fewest: int, samples: int, shares: Floats,
+) -> None:  # fmt: skip
+    """Share (k,) of the agreeing places of k lines whose step another eye's image (h, w, c) shows at the depth it ought
+    to have; NaN where that tells nothing.
+
+    near, deeper, far (k, m, 2): pixels there of every other place along each line at the least depth, the greatest and
+    infinitely far off; normals (k, 2). steps, agrees, beside (k, 2 m): of all places, and which of them count. A step
+    is looked for on samples across from the least depth to the greatest and `about` px beyond: the mean of three
+    places' steps, each of the tone that changes most, has to be `part` of the place's own, and `least` grey levels.
+    apart: px on the mean between the greatest depth and infinity, fewest: places that have to count, to tell."""
+    lines, places = near.shape[:2]
     height, width, channels = image.shape
     flat, tone = image.reshape(-1), np.empty((channels, samples))
     room, corner = np.empty((2, samples)), np.empty(samples, np.int64)
     raw = np.empty((places, samples - 2))
     for line in range(lines):
+        shares[line] = np.nan
+        nx, ny, from_far, counted, shown = normals[line, 0], normals[line, 1], 0.0, 0, 0
         for m in range(places):
-            step = extent[line, m] / (samples - 1)
+            counted += agrees[line, 2 * m] and beside[line, 2 * m]
+            from_far += abs((deeper[line, m, 0] - far[line, m, 0]) * nx + (deeper[line, m, 1] - far[line, m, 1]) * ny)
+        if not (from_far > apart * places and counted >= fewest):
+            continue
+        for m in range(places):
+            u, v = near[line, m, 0], near[line, m, 1]
+            behind = (deeper[line, m, 0] - u) * nx + (deeper[line, m, 1] - v) * ny
+            first, step = min(behind, 0.0) - about, (abs(behind) + 2 * about) / (samples - 1)
             for i in range(samples):
-                across = first[line, m] + step * i
-                room[0, i] = at[line, m, 0] + across * normals[line, 0]
-                room[1, i] = at[line, m, 1] + across * normals[line, 1]
+                across = first + step * i
+                room[0, i], room[1, i] = u + across * nx, v + across * ny
             _sampled(flat, height, width, channels, samples, room, corner, tone)
             row = raw[m]
             for i in range(samples - 2):
@@ -89,12 +104,21 @@ def strongest_across(
                 for i in range(samples - 2):
                     other = tone[c, i + 2] - tone[c, i]
                     row[i] = other if abs(other) > abs(row[i]) else row[i]
+        counted = 0
         for m in range(places):
+            middle = ((deeper[line, m, 0] - near[line, m, 0]) * nx + (deeper[line, m, 1] - near[line, m, 1]) * ny) / 2
+            u, v = near[line, m, 0] + middle * nx, near[line, m, 1] + middle * ny
+            inside = (u > 4) & (v > 4) & (u < width - 5) & (v < height - 5)
+            if not (inside and agrees[line, 2 * m] and beside[line, 2 * m]):
+                continue
             before, here, after = raw[m - 1 if m > 0 else places - 1], raw[m], raw[m + 1 if m + 1 < places else 0]
             most = 0.0
             for i in range(samples - 2):
                 most = max(most, abs(here[i] + before[i] + after[i]))
-            strongest[line, m] = most / 3
+            counted += 1
+            shown += most / 3 > max(part * abs(steps[line, 2 * m]), least)
+        if counted >= fewest:
+            shares[line] = shown / counted
 
 
 @compiled
@@ -210,21 +234,3 @@ def steps_before(
                 for c in range(channels):
                     most = max(most, abs(tone[c, i + 2] - tone[c, i]))
                 change[line, m, i] = most
-
-
-@compiled
-def seen_along(
-    t: Floats, agrees: NDArray[np.bool_], start: float, rate: float, seen: float, unseen: float, stations: Floats,
-    evidence: Floats, sums: Floats,
-) -> float:  # fmt: skip
-    """An edge's places t (m,) as stations (m,) = start + rate · t in rising order, what each says for the edge,
-    evidence (m,), as its step agrees or not, and the sums (m + 1,) of that up to each; returned: the greatest sum."""
-    count, most = len(t), 0.0
-    sums[0] = 0.0
-    for m in range(count):
-        k = m if rate * (t[count - 1] - t[0]) >= 0 else count - 1 - m
-        stations[m] = start + rate * t[k]
-        evidence[m] = seen if agrees[k] else unseen
-        sums[m + 1] = sums[m] + evidence[m]
-        most = max(most, sums[m + 1])
-    return most

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vision.candidates import Candidate
 from vision.capture import Image
 from vision.lines import sampled
+from vision.surface_kernels import median
 
 Array = NDArray[Any]  # of floats
 
@@ -67,7 +68,7 @@ def _fitted(places: Array, outward: Array, tones: Image, reach: int) -> Rise:
         squares = float((weight * full**2).sum()) + 1e-6
         share = float((weight * full * part).sum()) / squares
         residual = part - share * full
-        scatter = 1.4826 * float(np.median(np.abs(residual))) + 1e-6
+        scatter = 1.4826 * median(np.abs(residual)) + 1e-6
         weight = 1 / (1 + (residual / (2 * scatter)) ** 2) ** 2
     variance = float((weight * residual**2).sum() / weight.sum())
     return Rise(share, float(np.sqrt(4 * variance / squares)), reach)
