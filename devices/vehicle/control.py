@@ -29,6 +29,12 @@ class Target:
     climb_max: float = 3.0
     sink_max: float = 1.5
 
+    def ask_only_for_numbers(self) -> None:
+        """Leave open where and which way it is to be, and ask for no speed, where the numbers for it are not finite."""
+        place, speed = (self.n, self.e, self.d, self.yaw), (self.vn, self.ve, self.vd, self.yaw_rate)
+        self.n, self.e, self.d, self.yaw = (value if math.isfinite(value) else NAN for value in place)
+        self.vn, self.ve, self.vd, self.yaw_rate = (value if math.isfinite(value) else 0.0 for value in speed)
+
 
 POSITION_1_S = 0.73
 BRAKE_M_S2 = 2.6

@@ -3,19 +3,19 @@ nowhere else, whether they came over MAVLink or in process."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 from devices.vehicle.battery import Battery
 from devices.vehicle.body import Body
-from devices.vehicle.control import NAN, Controller, Target
-from devices.vehicle.estimator import VALID_AFTER_S, Estimator
+from devices.vehicle.control import Controller, Target
+from devices.vehicle.estimator import Estimator
 from devices.vehicle.failsafes import Failsafes
 from devices.vehicle.gimbal import Gimbal
 from devices.vehicle.land_detector import LandDetector
 from devices.vehicle.modes import Flight, Flying, Hold, Land, Mode, Sticks, flying
 from devices.vehicle.parameters import ParameterTable
+from devices.vehicle.readiness import not_armable, not_flyable
 from devices.vehicle.results import Result, Severity
 
 _IDLE_THRUST = 1.5
@@ -90,7 +90,7 @@ class Firmware:
 
     def set_mode(self, mode: Mode) -> Result:
         """Ask for a flight mode, as a companion or a ground station does."""
-        reason = self._not_flyable(mode) if self.armed else None
+        reason = not_flyable(self, mode) if self.armed else None
         if reason is not None:
             self._say(Severity.WARNING, f"Switching to {mode.name} is currently not available: {reason}")
             self._note("mode_refused", mode=mode.name, reason=reason)
@@ -112,10 +112,7 @@ class Firmware:
 
     def offboard_setpoint(self, setpoint: Target) -> None:
         """A setpoint from the companion computer, now."""
-        place = (setpoint.n, setpoint.e, setpoint.d, setpoint.yaw)
-        setpoint.n, setpoint.e, setpoint.d, setpoint.yaw = (n if math.isfinite(n) else NAN for n in place)
-        speed = (setpoint.vn, setpoint.ve, setpoint.vd, setpoint.yaw_rate)
-        setpoint.vn, setpoint.ve, setpoint.vd, setpoint.yaw_rate = (n if math.isfinite(n) else 0.0 for n in speed)
+        setpoint.ask_only_for_numbers()
         limits = self.parameters
         setpoint.speed_max = float(limits["MPC_XY_VEL_MAX"])
         setpoint.climb_max = float(limits["MPC_Z_VEL_MAX_UP"])
@@ -164,24 +161,7 @@ class Firmware:
     @property
     def not_armable(self) -> str | None:
         """Why it would refuse to arm, None when it would not."""
-        if self.time_s < VALID_AFTER_S:
-            return "no valid position estimate yet"
-        if self._battery.percent < 100 * float(self.parameters["BAT_CRIT_THR"]):
-            return "battery critical"
-        if self.mode in (Mode.LAND, Mode.RTL):
-            return "mode not suitable for take-off"
-        return self._not_flyable(self.intended)
-
-    def _not_flyable(self, mode: Mode) -> str | None:
-        if mode is Mode.OFFBOARD and not self.offboard_fresh:
-            return "no offboard signal"
-        if mode.piloted and not self.has_pilot:
-            return "no manual control"
-        if mode is Mode.MISSION:
-            return "no mission"
-        if mode.automatic and self.time_s < VALID_AFTER_S:
-            return "no valid position estimate yet"
-        return None
+        return not_armable(self, self._battery)
 
     # Every control cycle
 
