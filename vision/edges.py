@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.candidates import Candidate, weigh
+from vision.candidates import LEAST_SUPPORT, Candidate, weigh
 from vision.capture import Image
 from vision.closing import contradicted, evidence_of, find_closed, goes_on, opposite, unexplained, with_partner
 from vision.edge_fit import lens_bend, settled, trimmed
@@ -22,7 +22,7 @@ from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
 from vision.lines import edge_pixels, hough_lines, sensor_noise
 from vision.observation import Edge, Line
-from vision.unwitnessed import like_an_edge, typical_edge
+from vision.unwitnessed import MOST_EMPTY, like_an_edge, typical_edge
 
 Array = NDArray[Any]  # of floats
 
@@ -34,6 +34,7 @@ MOST_MISSING = 0.35  # of the dots within the edges, beyond which they are not b
 LEAST_GONE = 3  # missing dots between two steps that tell which of them is the edge
 PLAIN = 2.5  # times the blade's own texture: a step that needs no other witness to be an edge
 BEHIND_SHOULDER = 12.0  # px: so far behind it an end no longer bends the edges
+OUTSHINES = 3.0  # times another step
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
 
 
@@ -62,7 +63,9 @@ def find_edges(
     candidates = weigh(lines, blade, smooth, noise, other)
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
     typical = typical_edge(candidates)
-    believed = [c for c in candidates if c.beyond > 0 or like_an_edge(c, tones, typical)]
+    believed = [
+        c for c in candidates if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))
+    ]
     chosen = _choose([c for c in believed if not _hides_nothing(c, candidates, blade)], blade, largest)
     if len(chosen) == 1:
         chosen = with_partner(chosen[0], believed, blade, largest)
@@ -70,7 +73,7 @@ def find_edges(
     axis = float("nan") if expected is None else expected % np.pi
     closed = None
     if not goes_on(chosen):
-        closed = find_closed(candidates, blade, smooth, noise, largest)
+        closed = find_closed(believed, blade, smooth, noise, largest)
     if closed is not None and closed.evidence > evidence_of(chosen, blade):
         ending = closed.ending
         station = ending.shoulder - BEHIND_SHOULDER
@@ -94,6 +97,19 @@ def find_edges(
 def _bend_at_focus(edge: Candidate, blade: Blade) -> float:
     place = edge.profile.direction[edge.index] * float(edge.profile.focus[edge.index])
     return lens_bend(blade.camera, edge.outward * edge.rho + place, edge.outward)
+
+
+def _outshone(one: Candidate, candidates: list[Candidate]) -> bool:
+    """Whether a far clearer step, against which nothing speaks, runs across one that no dots tell of: where a blade is
+    wider than the laser's grid, streaks along its chord enclose the dots as its edges do."""
+    return any(
+        c.step > OUTSHINES * one.step
+        and c.empty <= MOST_EMPTY
+        and c.blocked < 0.5
+        and c.support >= LEAST_SUPPORT
+        and abs(float(c.outward @ one.outward)) < np.cos(LARGEST_FLARE)
+        for c in candidates
+    )
 
 
 def _hides_nothing(one: Candidate, candidates: list[Candidate], blade: Blade) -> bool:
