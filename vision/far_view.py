@@ -6,7 +6,7 @@ stands before another point than the hub's centre.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -15,22 +15,27 @@ from numpy.typing import NDArray
 from vision.camera import Camera
 from vision.capture import Image
 from vision.observation import FarView
-from vision.rotor_fit import Fit, Picture, fit_rotor, settled, start_of
-from vision.rotor_model import surprise
+from vision.rotor_fit import Fit, Picture, fit_rotor, plausibility, settled
+from vision.rotor_model import HUB, RADIUS, TURN, YAW, surprise
 from vision.rotor_search import guesses
 from vision.stopwatch import Now, Stopwatch
 
 Array = NDArray[np.float64]
 
 WORKING_PX = 800  # pictures wider than this are halved
-MODEL_HUB_PX = 1.0  # what equal straight edges leave out: foreshortening, twist, bend
-MODEL_DIRECTION = np.deg2rad(0.4)
-ASIDE_HUB_PX, ASIDE_DIRECTION = 6.0, np.deg2rad(3.0)  # times the sine of the yaw: twist shows from aside
+MODEL_HUB_PX, MODEL_DIRECTION = 0.6, np.deg2rad(0.25)  # what any model of a blade leaves out, seen from the front
+ASIDE_HUB_PX, ASIDE_DIRECTION = 2.0, np.deg2rad(1.0)  # times the sine of the yaw: more of it shows from aside
+# Edges that miss the model, or a rotor unlike others, tell that one of the edges is not the blade's: a tower's behind
+# it, say. Per px beyond what is usual, and per sigma.
+USUAL_MISS_PX, MISS_HUB, MISS_DIRECTION = 0.6, 6.0, np.deg2rad(2.0)
+USUAL_SURPRISE, ODD_HUB_PX, ODD_DIRECTION = 3.0, 1.0, np.deg2rad(0.35)
 LEAST_SUPPORT = 0.5  # of the better edge of each blade
-LEAST_SEEN, LEAST_AGREEMENT = 0.72, 0.55  # of all edges, after and before the last fraction of a pixel
+LEAST_OF_ANY = 0.25  # of any edge long enough to tell
+LONG_ENOUGH = 15  # samples of 70
+LEAST_SEEN, LEAST_AGREEMENT = 0.85, 0.55  # of all edges, after and before the last fraction of a pixel
 MOST_FITS = 4
 EQUAL_MERIT = 0.95
-CLEAR_AGREEMENT = 0.95  # share of the six edges' length at which no wider search is needed
+MOST_STARTS = 24
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,8 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None, n
         image = np.asarray(cv2.resize(image, (small.width, small.height), interpolation=cv2.INTER_AREA), np.uint8)
     picture = _picture(image, small)
     near, within = (expected.hub / factor, 4 * expected.sigma_px / factor) if expected is not None else (None, np.inf)
-    settled_on = _settled(picture, [start_of(guess) for guess in guesses(picture.planes, near, within)])
-    fits = [fit_rotor(picture, *found) for found in settled_on[:MOST_FITS]]
+    settled_on = _settled(picture, guesses(picture.planes, near, within))
+    fits = [fit_rotor(picture, parameters) for parameters, _ in settled_on]
     watch.lap("far_view")
     elapsed = watch.elapsed_ms
     if not fits:
@@ -79,11 +84,7 @@ def find_rotor(image: Image, camera: Camera, expected: Expected | None = None, n
     hub_off = max((float(np.linalg.norm(fit.parameters[:2] - best.parameters[:2])) for fit in equals), default=0.0)
     turn_off = max((_turned(fit, best) for fit in equals), default=0.0)
     turn = np.argsort(directions)
-    aside = float(np.sin(abs(best.parameters[3])))
-    model_hub, model_direction = (
-        np.hypot(MODEL_HUB_PX, aside * ASIDE_HUB_PX),
-        np.hypot(MODEL_DIRECTION, aside * ASIDE_DIRECTION),
-    )
+    model_hub, model_direction = _left_out(best, small)
     return FarView(
         True,
         (),
@@ -106,26 +107,62 @@ def _picture(image: Image, camera: Camera) -> Picture:
         planes = image.astype(np.float32)[..., None]
     rough = planes[:, 2:] - 2 * planes[:, 1:-1] + planes[:, :-2]
     noise = max(0.4, 1.4826 * float(np.median(np.abs(rough[::4]))) / np.sqrt(6.0))
+    if any(camera.distortion):
+        planes = _straightened(planes, camera)
     blurred = cv2.GaussianBlur(planes, (0, 0), 1.0).reshape(planes.shape)
-    return Picture(blurred, camera, 0.5 * noise)
+    return Picture(blurred, replace(camera, distortion=(0.0, 0.0, 0.0, 0.0)), 0.5 * noise)
+
+
+def _straightened(planes: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
+    """The picture as a lens without distortion would draw it."""
+    v, u = np.mgrid[: camera.height, : camera.width]
+    rays = np.column_stack([np.ones(u.size), (u.ravel() - camera.cx) / camera.fx, (v.ravel() - camera.cy) / camera.fy])
+    at = camera.project(rays).astype(np.float32).reshape(*u.shape, 2)
+    straight = cv2.remap(planes, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(straight, np.float32).reshape(planes.shape)
 
 
 def _merit(fit: Fit) -> float:
-    """Agreement before the last fraction of a pixel, less what the edges then miss the model by."""
-    return fit.agreement - 0.15 * fit.residual_px if np.isfinite(fit.hub_sigma_px) else 0.0
+    """How plausible the fitted rotor is, less what the edges miss it by."""
+    return fit.plausibility - 0.1 * min(fit.residual_px, 5.0) if np.isfinite(fit.hub_sigma_px) else 0.0
 
 
-def _settled(picture: Picture, starts: list[Array]) -> list[tuple[Array, float]]:
-    """Where the guesses settle, with the share of edges that the picture agrees with, the best first."""
-    found: list[tuple[Array, float]] = []
-    for start in starts:
-        found.append(settled(picture, start))
-        if found[-1][1] > CLEAR_AGREEMENT:
-            # All six edges are there: nothing else in the picture can be as good.
-            return [found[-1]]
-    # One edge was taken for a line of the background, which a wider search among all six finds out.
-    found += [settled(picture, start, rounds=6, tries=500, breadth=1.8) for start in starts[:2]]
-    return sorted(found, key=lambda pair: -pair[1])
+def _settled(picture: Picture, starts: Array) -> list[tuple[Array, float]]:
+    """Where the best of the guesses (k, 12) settle, how plausible they are, the best first."""
+    if not len(starts):
+        return []
+    value = plausibility(picture, starts, samples=12, coarse=True)
+    found: list[Array] = []
+    for k in np.argsort(-value, kind="stable"):
+        if all(_apart(starts[k], other) for other in found):
+            found.append(starts[k])
+        if len(found) == MOST_STARTS:
+            break
+    first = sorted((settled(picture, start, rounds=3, tries=200) for start in found), key=lambda pair: -pair[1])
+    kept: list[tuple[Array, float]] = []
+    for parameters, plausible in first:
+        if all(_apart(parameters, other) for other, _ in kept) and plausible > 0.6 * first[0][1]:
+            kept.append((parameters, plausible))
+    again = [settled(picture, parameters, rounds=5, tries=300, breadth=0.6) for parameters, _ in kept[:MOST_FITS]]
+    again.sort(key=lambda pair: -pair[1])
+    return [pair for pair in again if pair[1] > 0.7 * again[0][1]]
+
+
+def _apart(one: Array, other: Array) -> bool:
+    """Whether two guesses (12,) lead the search to different places."""
+    turn = abs(float(np.angle(np.exp(3j * (one[TURN] - other[TURN]))) / 3))
+    size = abs(float(one[RADIUS] - other[RADIUS]))
+    return bool(np.linalg.norm(one[HUB] - other[HUB]) > 8 or turn > np.deg2rad(3) or size > 0.3)
+
+
+def _left_out(fit: Fit, camera: Camera) -> tuple[float, float]:
+    """Sigmas, of the hub in px and of directions in rad, of what the model leaves out."""
+    aside = float(np.sin(abs(fit.parameters[YAW])))
+    missed = max(fit.residual_px - USUAL_MISS_PX, 0.0)
+    odd = max(float(np.linalg.norm(surprise(fit.parameters[None], camera))) - USUAL_SURPRISE, 0.0)
+    hub = (MODEL_HUB_PX, ASIDE_HUB_PX * aside, MISS_HUB * missed, ODD_HUB_PX * odd)
+    turn = (MODEL_DIRECTION, ASIDE_DIRECTION * aside, MISS_DIRECTION * missed, ODD_DIRECTION * odd)
+    return float(np.linalg.norm(hub)), float(np.linalg.norm(turn))
 
 
 def _doubts(fit: Fit, camera: Camera) -> list[str]:
@@ -133,13 +170,15 @@ def _doubts(fit: Fit, camera: Camera) -> list[str]:
     best = (fit.support * np.minimum(fit.samples / 12, 1)).max(axis=1)
     if best.min() < LEAST_SUPPORT:
         reasons.append(f"only {int((best >= LEAST_SUPPORT).sum())} of three blades have an edge where it should be")
+    if not reasons and fit.support[fit.samples >= LONG_ENOUGH].min(initial=1.0) < LEAST_OF_ANY:
+        reasons.append("one edge of a blade is not where it should be")
     seen = float((fit.support * fit.samples).sum() / max(fit.samples.sum(), 1.0))
     if not reasons and (seen < LEAST_SEEN or fit.agreement < LEAST_AGREEMENT):
         reasons.append(f"only {min(seen, fit.agreement):.0%} of the blades' edges are where they should be")
     gaps = np.diff(np.sort(fit.directions), append=np.sort(fit.directions)[0] + 2 * np.pi)
     if np.abs(np.degrees(gaps) - 120).max() > 12:
         reasons.append("the blades are not 120° apart")
-    if np.abs(surprise(fit.parameters[None])).max() > 4:
+    if np.abs(surprise(fit.parameters[None], camera)).max() > 4:
         reasons.append("the blades have no blade's proportions")
     if np.any(np.abs(fit.parameters[:2]) > 0.95 * camera.centre):
         reasons.append("the hub lies outside the picture")

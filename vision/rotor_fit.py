@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from vision.camera import Camera
-from vision.rotor_model import TILT, directions, outline, surprise
-from vision.rotor_search import Guess
+from vision.rotor_kernels import agreements
+from vision.rotor_model import CHORD, CONE, HUB, RADIUS, SHAPE, SIZE, directions, lens, outline, surprise, table
 
 Array = NDArray[np.float64]
 
@@ -21,12 +21,16 @@ REACHES = (5.0, 3.0)  # px across the expected edge in which it is looked for, r
 EDGE_PX = 1.0  # sigma of one edge point: what straight edges leave out, more than what the picture does
 NEIGHBOURS = 6.0  # points that err together
 AGREES_PX = 2.5
-SCALE = np.array([1.0, 1.0, 0.01, 0.1, 0.1, 1.0, 1.0, 1e-3])
+COARSE_PX = 2.0
+SURPRISE = 0.006  # of agreement that one sigma squared of surprise is worth
+SCALE = np.array([1.0, 1.0, 0.01, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.02, 0.1])
+SPREAD = np.array([6.0, 6.0, 0.03, 0.15, 0.06, 0.2, 0.2, 0.10, 0.08, 0.2, 0.02, 0.08])  # of the search around a guess
 
 
 @dataclass(frozen=True)
 class Picture:
-    """Channels (h, w, c) as float32, slightly blurred, seen through a camera; `noise` in grey levels of any channel."""
+    """Channels (h, w, c) as float32, slightly blurred, as a camera without distortion sees them; `noise` in grey levels
+    of any channel."""
 
     planes: NDArray[np.float32]
     camera: Camera
@@ -35,35 +39,35 @@ class Picture:
     @cached_property
     def gradient(self) -> NDArray[np.float32]:
         """(h, w, 2): the derivatives (right, down) of the channel that changes most, grey levels a pixel."""
-        shape = self.planes.shape
-        both = [cv2.Sobel(self.planes, cv2.CV_32F, *order, scale=0.125).reshape(shape) for order in ((1, 0), (0, 1))]
-        strongest = np.argmax(np.abs(both[0]) + np.abs(both[1]), axis=2)[..., None]
-        return np.concatenate([np.take_along_axis(g, strongest, 2) for g in both], axis=2)
+        return _gradient(self.planes)
 
-    def pixels(self, points: Array) -> Array:
-        """Where the lens draws points (…, 2) of the undistorted image frame, in pixels."""
-        camera = self.camera
-        pixels = points + camera.centre
-        if any(camera.distortion):
-            rays = (pixels.reshape(-1, 2) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-            pixels = camera.project(np.column_stack([np.ones(len(rays)), rays])).reshape(points.shape)
-        return np.asarray(pixels, float)
+    @cached_property
+    def coarse(self) -> NDArray[np.float32]:
+        """The same of the picture blurred, in which an edge is felt from further away."""
+        return _gradient(cv2.GaussianBlur(self.planes, (0, 0), COARSE_PX).reshape(self.planes.shape))
 
     def at(self, points: Array) -> Array:
         """Values (n, m, c) at points (n, m, 2) of the undistorted image frame."""
-        pixels = self.pixels(points).astype(np.float32)
+        pixels = (points + (np.array(self.planes.shape[1::-1]) - 1) / 2).astype(np.float32)
         u, v = np.ascontiguousarray(pixels[..., 0]), np.ascontiguousarray(pixels[..., 1])
         values = cv2.remap(self.planes, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(values, float).reshape(*points.shape[:-1], -1)
 
 
+def _gradient(planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    both = [cv2.Sobel(planes, cv2.CV_32F, *order, scale=0.125).reshape(planes.shape) for order in ((1, 0), (0, 1))]
+    strongest = np.argmax(np.abs(both[0]) + np.abs(both[1]), axis=2)[..., None]
+    return np.ascontiguousarray(np.concatenate([np.take_along_axis(g, strongest, 2) for g in both], axis=2))
+
+
 @dataclass(frozen=True)
 class Fit:
-    """The fitted rotor. parameters (8,): of `vision.rotor_model`. directions (3,) of the blades in the undistorted
+    """The fitted rotor. parameters (12,): of `vision.rotor_model`. directions (3,) of the blades in the undistorted
     image.
 
     support (3, 2): for each blade, leading and trailing, the share of samples (3, 2) inside the picture that lie on the
-    fitted edge. agreement: share of the edges' whole length on which the picture changes across them.
+    fitted edge. agreement: share of the edges' whole length on which the picture changes across them; plausibility: as
+    the function says.
     """
 
     parameters: Array
@@ -74,18 +78,12 @@ class Fit:
     samples: Array
     residual_px: float
     agreement: float
+    plausibility: float
 
 
-def start_of(guess: Guess) -> Array:
-    """Parameters (8,) of the rotor model for a first guess, seen straight from the front."""
-    third = 2 * np.pi / 3
-    turn = float(np.angle(np.exp(3j * guess.directions).sum()) / 3)
-    turn += third * np.round((guess.directions[0] - turn) / third)
-    return np.array([*guess.hub, turn, 0.0, TILT[0], guess.leading, guess.trailing, 1 / guess.length])
-
-
-def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
-    """Settled parameters (8,) moved to where the edges really are, with their support."""
+def fit_rotor(picture: Picture, parameters: Array) -> Fit:
+    """Settled parameters (12,) moved to where the edges really are, with their support."""
+    agreed = float(agreement(picture, parameters[None])[0, 0])
     edges = edge_points(picture, parameters, REACHES[0])
     jacobian = np.zeros((0, len(SCALE)))
     for reach in REACHES:
@@ -106,7 +104,7 @@ def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
             samples[b, s] = here.sum()
             support[b, s] = agrees[here].mean() if here.any() else 0.0
     rms = float(np.sqrt(np.mean(residual[agrees] ** 2))) if agrees.any() else np.inf
-    covariance = np.full((8, 8), np.inf)
+    covariance = np.full((SIZE, SIZE), np.inf)
     if agrees.sum() > 30:
         covariance = np.linalg.pinv(jacobian.T @ jacobian) * max(rms / EDGE_PX, 0.7) ** 2 * NEIGHBOURS
     here = directions(parameters, picture.camera)
@@ -118,7 +116,8 @@ def fit_rotor(picture: Picture, parameters: Array, agreement: float) -> Fit:
         support,
         samples,
         rms,
-        agreement,
+        agreed,
+        float(plausibility(picture, parameters[None])[0]),
     )
 
 
@@ -133,51 +132,49 @@ def _direction_sigma(parameters: Array, covariance: Array, camera: Camera) -> Ar
     return result
 
 
-def settled(
-    picture: Picture, start: Array, rounds: int = 4, tries: int = 240, breadth: float = 1.0
-) -> tuple[Array, float]:
-    """The parameters (8,) near `start` whose six edges the picture agrees with most, and that agreement, 0 to 1.
+def settled(picture: Picture, start: Array, rounds: int, tries: int, breadth: float = 1.0) -> tuple[Array, float]:
+    """The parameters (12,) near `start` that are most plausible in the picture, and how plausible they are.
 
     A cross-entropy search: any line of the background may be stronger than one edge of one blade, but nothing else
     agrees with all six at once. breadth: of the search, 1 for a good guess. The same picture gives the same answer.
     """
     rng = np.random.default_rng(0)
-    width = start[5] + start[6]
     mean = start.copy()
-    spread = breadth * np.array([4, 4, 0.02, 0.15, 0.06, 0.08 * width + 1, 0.12 * width + 1, 0.2 * start[7]])
+    spread = breadth * SPREAD
+    spread[HUB] += breadth * 0.1 * SHAPE[1] * np.exp(start[RADIUS] + start[CHORD])
     best, best_value = start, -np.inf
     for _ in range(rounds):
-        drawn = mean + spread * rng.standard_normal((tries, 8))
+        drawn = mean + spread * rng.standard_normal((tries, SIZE))
         drawn[0] = best
-        value = agreement(picture, drawn) - 0.01 * (surprise(drawn) ** 2).sum(axis=1)
-        order = np.argsort(-value)[: tries // 10]
+        value = plausibility(picture, drawn)
+        order = np.argsort(-value, kind="stable")[: max(tries // 10, 12)]
         if value[order[0]] > best_value:
             best, best_value = drawn[order[0]], float(value[order[0]])
         mean, spread = drawn[order].mean(axis=0), 1.1 * drawn[order].std(axis=0) + 1e-6
-    return best, float(agreement(picture, best[None])[0])
+    return best, best_value
 
 
-def agreement(picture: Picture, parameters: Array, samples: int = 30) -> Array:
-    """(k,): share of the six edges' length, 0 to 1, on which the picture changes across them, for parameters (k, 8)."""
-    edges = outline(parameters, np.linspace(0, 1, samples), picture.camera)
-    half = picture.camera.centre - 2
-    inside = np.all(np.abs(edges.points) < half, axis=-1)
-    height, width = picture.planes.shape[:2]
-    pixels = np.rint(picture.pixels(edges.points)).astype(np.int64)
-    u, v = np.clip(pixels[..., 0], 0, width - 1), np.clip(pixels[..., 1], 0, height - 1)
-    gradient = picture.gradient[v, u]
-    cos, sin = edges.direction[..., None, 0], edges.direction[..., None, 1]
-    across = np.abs(gradient[..., 1] * cos - gradient[..., 0] * sin)
-    along = np.abs(gradient[..., 0] * cos + gradient[..., 1] * sin)
-    step = np.clip((across - 0.5 * along) / (4 * picture.noise + 1.0), 0, 1) * inside
-    # An edge that hardly enters the picture says little, and as little as it says it may count.
-    shares = step.sum(axis=-1) / np.maximum(inside.sum(axis=-1), samples / 4)
-    return np.asarray(shares.mean(axis=(1, 2)), float)
+def plausibility(picture: Picture, parameters: Array, samples: int = 30, coarse: bool = False) -> Array:
+    """(k,): how much of the picture rotors (k, 12) explain, in image diagonals, less what is surprising about them."""
+    explained = agreement(picture, parameters, samples, coarse)[:, 1]
+    diagonal = float(np.hypot(*picture.planes.shape[:2]))
+    result: Array = explained / (2 * diagonal) - SURPRISE * (surprise(parameters, picture.camera) ** 2).sum(axis=1)
+    return result
+
+
+def agreement(picture: Picture, parameters: Array, samples: int = 30, coarse: bool = False) -> Array:
+    """(k, 2): share of the six edges' length, 0 to 1, on which the picture changes across them, for parameters
+    (k, 12), and by how many px it does so beyond chance."""
+    gradient, step = (picture.coarse, 2 * picture.noise + 0.5) if coarse else (picture.gradient, 4 * picture.noise + 1)
+    result: Array = agreements(
+        np.ascontiguousarray(parameters, float), table(samples), CONE, SHAPE, lens(picture.camera), gradient, step
+    )
+    return result
 
 
 @dataclass(frozen=True)
 class EdgePoints:
-    """Points (n, 2) on edges in the picture; the blade (n,), side (n,) and share (n,) of the straight stretch where
+    """Points (n, 2) on edges in the picture; the blade (n,), side (n,) and station (n,) where
     each was looked for, the direction (n, 2) across the edge, and whether there is a step of brightness at all."""
 
     points: Array
@@ -200,13 +197,14 @@ class EdgePoints:
 
 
 def edge_points(picture: Picture, parameters: Array, reach: float) -> EdgePoints:
-    """The strongest step across each edge of a rotor (8,), within `reach` px of where the model has it."""
-    edges = outline(parameters[None], np.linspace(0, 1, SAMPLES), picture.camera)
+    """The strongest step across each edge of a rotor (12,), within `reach` px of where the model has it."""
+    edges = outline(parameters[None], SAMPLES, picture.camera)[0]
     half = picture.camera.centre - 3 - reach
     shifts = np.arange(-reach - 1, reach + 2)
-    blade, side, share = np.nonzero(np.all(np.abs(edges.points[0]) < half, axis=-1))
-    middle = edges.points[0][blade, side, share]
-    along = edges.direction[0][blade, side]
+    blade, side, share = np.nonzero(np.all(np.abs(edges) < half, axis=-1))
+    middle = edges[blade, side, share]
+    step = np.gradient(edges, axis=2)[blade, side, share]
+    along = step / np.linalg.norm(step, axis=-1, keepdims=True)
     across = np.column_stack([-along[:, 1], along[:, 0]])
     if len(middle) == 0:
         return EdgePoints(middle, blade, side, share, across, np.zeros(0, bool))
@@ -226,9 +224,9 @@ def edge_points(picture: Picture, parameters: Array, reach: float) -> EdgePoints
 
 
 def _residuals(parameters: Array, edges: EdgePoints, camera: Camera) -> Array:
-    """Distance (n,) of edge points from the model's edges, then (4,) what is known of any rotor, in units of their
+    """Distance (n,) of edge points from the model's edges, then (9,) what is known of any rotor, in units of their
     sigma."""
-    model = outline(parameters[None], np.linspace(0, 1, SAMPLES), camera).points[0]
+    model = outline(parameters[None], SAMPLES, camera)[0]
     off = ((edges.points - model[edges.blade, edges.side, edges.share]) * edges.across).sum(axis=1) / EDGE_PX
-    result: Array = np.concatenate([off, surprise(parameters[None])[0] * np.sqrt(NEIGHBOURS)])
+    result: Array = np.concatenate([off, surprise(parameters[None], camera)[0] * np.sqrt(NEIGHBOURS)])
     return result

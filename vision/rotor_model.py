@@ -1,105 +1,100 @@
-"""What a rotor's straight blade edges look like from anywhere before it: three equal tapered blades on a cone, in
-perspective.
+"""What a rotor's blade edges look like from anywhere before it: three equal blades on a cone, turned about their own
+axes by one pitch, in perspective.
 
-Parameters (8,): hub y, z in the image frame (px); turn of the rotor (rad, clockwise from +y_im, of one blade); yaw and
-tilt of the rotor's axis against the camera's (rad); then, at the hub's distance and in px, how far before and behind a
-blade's axis its edges would start at the hub, and the inverse of the distance at which they would meet.
+A blade's section is a round nose, as thick as the blade, and a sharp trailing edge, so that the outline is right from
+the front and from aside, of blades in the rotor's plane and of feathered ones, of which only the thickness is seen.
+
+Parameters (12,): hub y, z in the image frame (px); turn of the rotor (rad, clockwise from +y_im, of one blade); yaw and
+tilt of the rotor's axis against the camera's (rad); pitch of the blades (rad); logarithm of the rotor's radius at the
+hub's distance in px; logarithms of what the largest chord, the root's and the tip's differ by from a usual blade's; by
+how many chords the axis lies further back; logarithm of how much thicker it is.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import Camera
+from vision.rotor_kernels import traces
 
 Array = NDArray[np.float64]
 
+HUB, TURN, YAW, TILT, PITCH, RADIUS, CHORD, ROOT, TIP, AXIS, THICKNESS = slice(0, 2), 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
+SIZE = 12
 CONE = np.deg2rad(2.5)
-INBOARD = 2.1  # the edges are straight from this many root widths (of the straight edges, prolonged) outward
-OUTBOARD = 0.85  # of the length at which they would meet
+SHAPE = np.array([0.047, 0.088, 0.013])  # root's diameter, largest chord and tip's chord of a usual blade, in radii
+INBOARD, OUTBOARD = 0.055, 0.94  # stations between which the outline is known; the spinner hides the rest
 # What is known of any rotor from any place before it: mean and sigma.
-YAW = 0.0, np.deg2rad(12.0)
-TILT = np.deg2rad(5.0), np.deg2rad(5.0)
-LEADING_SHARE = 0.31, 0.04  # of a blade's width before its axis
-SLENDER = 9.5, 0.2  # length over width of the prolonged edges; sigma of its logarithm
+USUAL_TILT = np.deg2rad(5.0)
+KNOWN = {
+    YAW: (0.0, np.deg2rad(14.0)),
+    TILT: (USUAL_TILT, np.deg2rad(5.0)),
+    CHORD: (0.0, 0.15),
+    ROOT: (0.0, 0.12),
+    TIP: (0.0, 0.4),
+    AXIS: (0.0, 0.03),
+    THICKNESS: (0.0, 0.12),
+}
+USUAL_SIZE = 0.8, 0.45  # a rotor's radius over its distance; sigma of its logarithm
+PITCHES = np.deg2rad(-4.0), np.deg2rad(94.0)
+PITCH_SIGMA = np.deg2rad(4.0)  # beyond these
+# Along a usual blade, by share of the radius.
+_STATION = (0.025, 0.055, 0.12, 0.22, 0.36, 0.51, 0.66, 0.80, 0.92, 1.0)
+_RISE = (0.0, 0.0, 0.55, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)  # of the way from the root to the largest chord
+_FALL = (0.0, 0.0, 0.0, 0.0, 0.26, 0.47, 0.65, 0.82, 0.935, 1.0)  # of the way from there to the tip's
+_THICK = (1.0, 1.0, 0.62, 0.36, 0.26, 0.21, 0.19, 0.175, 0.165, 0.16)
+_AXIS = (0.5, 0.5, 0.40, 0.32, 0.31, 0.30, 0.30, 0.30, 0.30, 0.30)
+_TWIST_DEG = (13.0, 13.0, 12.0, 11.0, 7.5, 4.5, 2.6, 1.2, 0.4, 0.0)
 
 
-@dataclass(frozen=True)
-class Outline:
-    """Points (k, 3, 2, n, 2) in the undistorted image frame: k rotors, blades, leading and trailing edge, along the
-    edge."""
-
-    points: Array
-    direction: Array  # (k, 3, 2, 2) unit vectors along the edges
-
-
-def outline(parameters: Array, shares: Array, camera: Camera) -> Outline:
-    """The edges of rotors (k, 8) at shares (n,) of their straight stretch."""
-    hub, unit = place(parameters, camera)
-    axes = rotor_axes(parameters)
-    leading, trailing, taper = parameters[:, 5], parameters[:, 6], np.maximum(parameters[:, 7], 1e-4)
-    first = INBOARD * (leading + trailing)
-    last = np.maximum(OUTBOARD / taper, first + 10)
-    r = first[:, None] + (last - first)[:, None] * shares
-    points = np.empty((len(parameters), 3, 2, len(shares), 2))
-    for b in range(3):
-        along, across = blade_axes(parameters[:, 2] + b * 2 * np.pi / 3, axes)
-        for s, root in enumerate((leading, -trailing)):
-            w = root[:, None] * (1 - taper[:, None] * r)
-            x, y, z = (hub[:, k, None] + (r * along[:, k, None] + w * across[:, k, None]) / unit for k in range(3))
-            points[:, b, s, :, 0] = camera.fx * y / x
-            points[:, b, s, :, 1] = camera.fy * z / x
-    points += np.array([camera.cx, camera.cy]) - camera.centre
-    step = points[..., -1, :] - points[..., 0, :]
-    return Outline(points, step / np.linalg.norm(step, axis=-1, keepdims=True))
+@cache
+def table(samples: int) -> Array:
+    """(n, 6): the usual blade at n stations, for `vision.rotor_kernels`."""
+    station = np.linspace(INBOARD, OUTBOARD, samples)
+    columns = [np.interp(station, _STATION, values) for values in (_RISE, _FALL, _THICK, _AXIS, _TWIST_DEG)]
+    # The kernel goes from a round section to the foil with the rise.
+    columns[2] = np.where(columns[0] > 0, 1 + (columns[2] - 1) / np.maximum(columns[0], 1e-9), 1.0)
+    columns[4] = np.deg2rad(columns[4])
+    return np.ascontiguousarray(np.column_stack([station, *columns]))
 
 
-def place(parameters: Array, camera: Camera) -> tuple[Array, float]:
-    """The hub (k, 3) in the camera frame at unit depth, and px per unit there."""
-    yz = (parameters[:, :2] + camera.centre - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-    return np.column_stack([np.ones(len(parameters)), yz]), camera.fx
+def lens(camera: Camera) -> Array:
+    """(4,): focal lengths and the principal point in the image frame."""
+    return np.array([camera.fx, camera.fy, *(np.array([camera.cx, camera.cy]) - camera.centre)])
+
+
+def outline(parameters: Array, samples: int, camera: Camera) -> Array:
+    """Points (k, 3, 2, n, 2) in the undistorted image frame of rotors (k, 12): blade, leading and trailing edge, n
+    stations."""
+    points: Array = traces(np.ascontiguousarray(parameters, float), table(samples), CONE, SHAPE, lens(camera))
+    return points
 
 
 def rotor_axes(parameters: Array) -> Array:
-    """(k, 3, 3): columns are the rotor's axes in the camera frame."""
-    cy, sy = np.cos(parameters[:, 3]), np.sin(parameters[:, 3])
-    cp, sp = np.cos(parameters[:, 4]), -np.sin(parameters[:, 4])
-    zero = np.zeros_like(cy)
-    rows = [[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, zero, cp]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def blade_axes(turn: Array, axes: Array) -> tuple[Array, Array]:
-    """Unit vectors (k, 3) in the camera frame along and clockwise across blades at turns (k,), cone included."""
-    x, y, z = axes[..., 0], axes[..., 1], axes[..., 2]
-    cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
-    return np.cos(CONE) * (cos * y + sin * z) - np.sin(CONE) * x, cos * z - sin * y
+    """(3, 3): columns are the axes of a rotor (12,) in the camera frame."""
+    cy, sy = np.cos(parameters[YAW]), np.sin(parameters[YAW])
+    cp, sp = np.cos(parameters[TILT]), -np.sin(parameters[TILT])
+    return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
 
 
 def directions(parameters: Array, camera: Camera) -> Array:
-    """Directions (3,) of the blades' axes in the undistorted image, of one rotor (8,)."""
-    hub, _ = place(parameters[None], camera)
-    axes = rotor_axes(parameters[None])
-    found = []
-    for b in range(3):
-        along = blade_axes(parameters[None, 2] + b * 2 * np.pi / 3, axes)[0][0]
-        y, z = (along[1:] - hub[0, 1:] * along[0]) * (camera.fx, camera.fy)
-        found.append(np.arctan2(z, y) % (2 * np.pi))
-    return np.array(found)
+    """Directions (3,) of the blades' axes in the undistorted image, of one rotor (12,)."""
+    hub = (parameters[HUB] - lens(camera)[2:]) / (camera.fx, camera.fy)
+    x, y, z = rotor_axes(parameters).T
+    turn = parameters[TURN] + np.arange(3)[:, None] * 2 * np.pi / 3
+    along = np.cos(CONE) * (np.cos(turn) * y + np.sin(turn) * z) - np.sin(CONE) * x
+    seen = (along[:, 1:] - hub * along[:, :1]) * (camera.fx, camera.fy)
+    result: Array = np.arctan2(seen[:, 1], seen[:, 0]) % (2 * np.pi)
+    return result
 
 
-def surprise(parameters: Array) -> Array:
-    """(k, 4): by how many sigmas rotors (k, 8) differ from what is known of any rotor."""
-    width = np.maximum(parameters[:, 5] + parameters[:, 6], 1e-3)
-    slender = np.log(np.maximum(1 / (np.maximum(parameters[:, 7], 1e-5) * width), 1e-3) / SLENDER[0]) / SLENDER[1]
-    return np.column_stack(
-        [
-            (parameters[:, 3] - YAW[0]) / YAW[1],
-            (parameters[:, 4] - TILT[0]) / TILT[1],
-            (parameters[:, 5] / width - LEADING_SHARE[0]) / LEADING_SHARE[1],
-            slender,
-        ]
-    )
+def surprise(parameters: Array, camera: Camera) -> Array:
+    """(k, 9): by how many sigmas rotors (k, 12) differ from what is known of any rotor."""
+    known = np.column_stack([(parameters[:, at] - mean) / sigma for at, (mean, sigma) in KNOWN.items()])
+    pitch = parameters[:, PITCH]
+    beyond = (np.minimum(pitch - PITCHES[0], 0) + np.maximum(pitch - PITCHES[1], 0)) / PITCH_SIGMA
+    size = (parameters[:, RADIUS] - np.log(USUAL_SIZE[0] * camera.fx)) / USUAL_SIZE[1]
+    return np.column_stack([known, beyond, size])

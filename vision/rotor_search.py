@@ -1,42 +1,39 @@
 """First guesses of a rotor in a picture, from straight edges alone.
 
 Two lines that close slowly may be the edges of a blade, and its axis then runs through the point where they meet. Two
-such blades, 120° apart, that have one length and one width around the crossing of their axes may be a rotor: horizon,
-tower and fields do not have this symmetry, and the third blade may be hard to tell from the tower that it hides.
+such blades, 120° apart, around the crossing of their axes may be a rotor; whether they are, and how they are pitched,
+the whole model has to tell.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.rotor_model import HUB, PITCH, RADIUS, SHAPE, SIZE, TILT, TURN, USUAL_TILT, YAW
+
 Array = NDArray[np.float64]
 
 ANGLES = 180  # bins of the accumulator, modulo 180°
 RHO_STEP = 2.0
-MOST_LINES = 100
-SPACING = np.deg2rad(9.0)  # how far from 120° perspective may bring two blades
-CLOSING = np.deg2rad(1.0), np.deg2rad(15.0)  # by which angle the edges of a blade approach each other
-LEADING_SHARE = 0.31  # of a blade's width lies before its axis: blades turn about their front third
-LENGTH = 0.2, 3.0  # of the image's diagonal, from the hub to where the edges would meet
-MOST_TRIED = 150
-
-
-@dataclass(frozen=True)
-class Guess:
-    """hub (2,) in the image frame, px. directions (3,) of the blades' axes, rad clockwise from +y_im. At a distance r
-    from the hub the edges lie at leading · (1 - r / length) clockwise and at trailing · (1 - r / length)
-    counter-clockwise of the axis, all in px. score: votes of the six lines."""
-
-    hub: Array
-    directions: Array
-    leading: float
-    trailing: float
-    length: float
-    score: float
+MOST_LINES = 120
+SPACING = np.deg2rad(12.0)  # how far from 120° perspective may bring two blades
+CLOSING = np.deg2rad(0.5), np.deg2rad(15.0)  # by which angle the edges of a blade approach each other
+AXIS_SHARE = 0.38  # of a blade's width lies before its axis: less in the rotor's plane, half of it where feathered
+LENGTH = 0.15, 3.0  # of the image's diagonal, from the hub to where the edges would meet
+WIDTH = 0.005, 0.25  # of the image's diagonal, of a blade whose edges are prolonged to the hub
+ALIKE = 2.8  # by which factor widths and lengths of two blades may differ as they are seen
+RADII = 0.15, 2.5  # of the image's diagonal: the rotor's
+MOST_TRIED = 1200
+YAWS = np.deg2rad([-15.0, 15.0])
+SIZES = np.array([0.75, 1.0, 1.4])
+PITCHES = np.deg2rad([5.0, 40.0, 65.0, 85.0])
+ROOTWARD = 1.4  # the edges prolonged to the hub are so much wider than the largest chord
+OUTER_TWIST, OUTER_THICKNESS = np.deg2rad(5.0), 0.25
+THIRD = 2 * np.pi / 3
 
 
 def strongest_lines(planes: NDArray[np.float32], most: int = MOST_LINES) -> tuple[Array, Array]:
@@ -96,78 +93,62 @@ def _blades(lines: Array, votes: Array) -> _Blades:
     closing = lean[one, other]
     matrix = np.stack([np.stack([-np.sin(direction[k]), np.cos(direction[k])], axis=-1) for k in (one, other)], axis=1)
     apex = np.linalg.solve(matrix, np.stack([rho[one], rho[other]], axis=-1)[..., None])[..., 0]
-    axis = direction[one] + LEADING_SHARE * closing
+    axis = direction[one] + AXIS_SHARE * closing
     offset = apex[:, 1] * np.cos(axis) - apex[:, 0] * np.sin(axis)
     return _Blades(axis % (2 * np.pi), offset, apex, closing, strength[one] + strength[other])
 
 
-def guesses(planes: NDArray[np.float32], near: Array | None, within_px: float, most: int = 6) -> list[Guess]:
-    """First guesses of the rotor, the best first. near (2,): where the hub is expected in the image frame, within so
-    much.
+def guesses(planes: NDArray[np.float32], near: Array | None, within_px: float) -> Array:
+    """First guesses (k, 12) of the rotor (`vision.rotor_model`), those with the most votes first. near (2,): where the
+    hub is expected in the image frame, within so much.
 
-    Two blades 120° apart that have one length and one width at the point where their axes cross make a rotor; lines
-    where the third one must be add to its score.
+    How wide a blade looks depends on its pitch, so each pair of blades yields a guess for several pitches.
     """
     height, width = planes.shape[:2]
     diagonal = float(np.hypot(width, height))
     lines, votes = strongest_lines(planes)
     blades = _blades(lines, votes)
     gap = (blades.direction[None, :] - blades.direction[:, None]) % (2 * np.pi)
-    one, other = np.nonzero(np.abs(gap - 2 * np.pi / 3) < SPACING)
+    one, other = np.nonzero(np.abs(gap - THIRD) < SPACING)
     d1, d2 = blades.direction[one], blades.direction[other]
-    cross = np.sin(d2 - d1)
     o1, o2 = blades.offset[one], blades.offset[other]
     # The axes v·p = o with v = (-sin d, cos d) cross at the hub.
-    hub = np.stack([o1 * np.cos(d2) - o2 * np.cos(d1), o1 * np.sin(d2) - o2 * np.sin(d1)], axis=-1) / cross[:, None]
-    lengths = np.stack(
-        [
-            (blades.apex[k] - hub)[:, 0] * np.cos(d) + (blades.apex[k] - hub)[:, 1] * np.sin(d)
-            for k, d in ((one, d1), (other, d2))
-        ]
-    )
-    widths = lengths * np.tan(np.stack([blades.closing[one], blades.closing[other]]))
+    hub = np.stack([o1 * np.cos(d2) - o2 * np.cos(d1), o1 * np.sin(d2) - o2 * np.sin(d1)], axis=-1)
+    hub /= np.sin(d2 - d1)[:, None]
     good = np.all(np.abs(hub) < 0.95 * np.array([width, height]) / 2, axis=1)
     if near is not None:
         good &= np.linalg.norm(hub - near, axis=1) < within_px
-    good &= np.all((lengths > LENGTH[0] * diagonal) & (lengths < LENGTH[1] * diagonal), axis=0)
-    good &= np.all((widths > 0.006 * diagonal) & (widths < 0.2 * diagonal), axis=0)
-    good &= np.abs(np.log(np.maximum(widths[0], 1) / np.maximum(widths[1], 1))) < np.log(1.4)
-    good &= np.abs(np.log(np.maximum(lengths[0], 1) / np.maximum(lengths[1], 1))) < np.log(1.6)
-    one, other, hub, lengths, widths = one[good], other[good], hub[good], lengths[:, good], widths[:, good]
-    score = blades.votes[one] + blades.votes[other]
-    found: list[Guess] = []
-    for k in np.argsort(-score, kind="stable")[:MOST_TRIED]:
-        first, second = blades.direction[one[k]], blades.direction[other[k]]
-        third = first + np.angle(np.exp(1j * (second - first))) / 2 + np.pi
-        length, wide = float(np.sqrt(lengths[:, k].prod())), float(np.sqrt(widths[:, k].prod()))
-        directions = np.array([first, second, third]) % (2 * np.pi)
-        guess = Guess(hub[k], directions, LEADING_SHARE * wide, (1 - LEADING_SHARE) * wide, length, float(score[k]))
-        guess = replace(guess, score=guess.score + _third(guess, lines, votes))
-        rival = next((i for i, g in enumerate(found) if not _apart(guess, g)), None)
-        if rival is None:
-            found.append(guess)
-        elif guess.score > found[rival].score:
-            found[rival] = guess
-    return sorted(found, key=lambda g: -g.score)[:most]
+    one, other, hub, d1, d2 = one[good], other[good], hub[good], d1[good], d2[good]
+    ends = [blades.apex[k] - hub for k in (one, other)]
+    lengths = np.stack([end[:, 0] * np.cos(d) + end[:, 1] * np.sin(d) for end, d in zip(ends, (d1, d2), strict=True)])
+    widths = lengths * np.tan(np.stack([blades.closing[one], blades.closing[other]]))
+    good = np.all((lengths > LENGTH[0] * diagonal) & (lengths < LENGTH[1] * diagonal), axis=0)
+    good &= np.all((widths > WIDTH[0] * diagonal) & (widths < WIDTH[1] * diagonal), axis=0)
+    good &= np.abs(np.log(np.maximum(widths[0], 1) / np.maximum(widths[1], 1))) < np.log(ALIKE)
+    good &= np.abs(np.log(np.maximum(lengths[0], 1) / np.maximum(lengths[1], 1))) < np.log(ALIKE)
+    best = np.flatnonzero(good)
+    best = best[np.argsort(-(blades.votes[one] + blades.votes[other])[best], kind="stable")[:MOST_TRIED]]
+    turn = (d1 + _wrapped(d2 - d1 - THIRD) / 2)[best]
+    wide = np.sqrt(widths[:, best].prod(axis=0))
+    found = np.zeros((len(best), len(YAWS), len(SIZES), len(PITCHES), SIZE))
+    found[..., HUB] = hub[best, None, None, None]
+    found[..., TURN] = turn[:, None, None, None]
+    found[..., YAW] = YAWS[:, None, None]
+    found[..., TILT] = USUAL_TILT
+    found[..., PITCH] = PITCHES
+    found[..., RADIUS] = np.log(
+        SIZES[:, None] * wide[:, None, None, None] / (ROOTWARD * SHAPE[1] * _seen_width(PITCHES))
+    )
+    every = found.reshape(-1, SIZE)
+    size = every[:, RADIUS] - np.log(diagonal)
+    result: Array = every[(size > np.log(RADII[0])) & (size < np.log(RADII[1]))]
+    return result
 
 
-def _third(guess: Guess, lines: Array, votes: Array) -> float:
-    """Votes of the lines nearest to where the edges of the blade that was not used must be."""
-    total = 0.0
-    for root, side in ((guess.leading, 1.0), (guess.trailing, -1.0)):
-        direction = guess.directions[2] - side * root / guess.length
-        normal = np.array([-np.sin(direction), np.cos(direction)])
-        turn = _wrapped(2 * (lines[:, 0] - direction - np.pi / 2)) / 2
-        oriented = np.where(np.cos(lines[:, 0] - direction - np.pi / 2) > 0, 1.0, -1.0) * lines[:, 1]
-        off = oriented - normal @ guess.hub - side * root
-        close = (np.abs(turn) < np.deg2rad(4)) & (np.abs(off) < 0.5 * (guess.leading + guess.trailing) + 4)
-        total += float(np.minimum(votes[close], 120).max(initial=0.0))
-    return total
-
-
-def _apart(one: Guess, other: Guess) -> bool:
-    turn = _wrapped(3 * (one.directions[0] - other.directions[0])) / 3
-    return bool(np.linalg.norm(one.hub - other.hub) > 10 or abs(turn) > np.deg2rad(3))
+def _seen_width(pitch: Array) -> Array:
+    """Of a blade from the front, in chords: what its chord and its thickness hide."""
+    result: Array = np.hypot(np.cos(pitch + OUTER_TWIST), OUTER_THICKNESS * np.sin(pitch + OUTER_TWIST))
+    return result
 
 
 def _wrapped(angle: Array) -> Array:

@@ -14,7 +14,8 @@ from devices.world.view import Renderer, draw
 from vision.camera import Camera, RigGeometry, StereoPair
 from vision.capture import CameraPose, rotation_of
 from vision.far_view import Expected, find_rotor
-from vision.rotor_model import directions, outline
+from vision.rotor_kernels import THICKEST
+from vision.rotor_model import CONE, SHAPE, directions, outline, table
 
 CAMERA = Camera(612, 512, 616.0, 616.0, 305.5, 255.5)
 
@@ -28,9 +29,10 @@ def picture(
     background: str = "fields",
     brightness: float = 185.0,
     sun_deg: float = 215.0,
+    pitch_deg: float = 2.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """An image and the hub (2,) and directions (3,) that geometry says it shows."""
-    shape = TurbineShape(north_m=60, east_m=10, heading_deg=8, azimuth_deg=azimuth_deg)
+    shape = TurbineShape(north_m=60, east_m=10, heading_deg=8, azimuth_deg=azimuth_deg, pitch_deg=pitch_deg)
     light = Light(background=background, blade_brightness=brightness, sun_azimuth_deg=sun_deg)
     x, y, _ = shape.rotation.T
     place = shape.hub - distance * x + side * y + np.array([0, 0, 1.5])
@@ -52,6 +54,10 @@ VIEWS = {
     "blade along the horizon, from the right": {"azimuth_deg": 90.0, "side": 12.0},
     "near": {"azimuth_deg": 40.0, "distance": 32.0},
     "far, dark, over the sea": {"azimuth_deg": 100.0, "distance": 78.0, "brightness": 90.0, "background": "sea"},
+    "feathered, from the front": {"azimuth_deg": 20.0, "pitch_deg": 86.0, "distance": 60.0},
+    "half feathered, from aside": {"azimuth_deg": 310.0, "pitch_deg": 50.0, "side": -20.0, "distance": 55.0},
+    "very near": {"azimuth_deg": 200.0, "distance": 30.0, "side": 2.0},
+    "far aside": {"azimuth_deg": 160.0, "distance": 65.0, "side": 28.0},
     "bright, sun behind the camera": {"azimuth_deg": 75.0, "brightness": 235.0, "sun_deg": 190.0},
 }
 
@@ -65,7 +71,7 @@ def test_hub_and_blades_are_where_they_truly_are(view: str) -> None:
     assert np.linalg.norm(found.hub - hub) < 3 * found.hub_sigma_px
     off = np.angle(np.exp(1j * (found.directions - blades)))
     assert np.all(np.abs(off) < 3 * found.direction_sigma)
-    assert np.all(found.direction_sigma < np.deg2rad(1.0))
+    assert np.all(found.direction_sigma < np.deg2rad(2.0))
 
 
 def test_grey_and_larger_pictures_show_the_same() -> None:
@@ -120,23 +126,37 @@ def test_the_survey_tells_where_to_look() -> None:
     assert not elsewhere.valid
 
 
-def test_the_model_draws_the_edges_of_a_true_rotor() -> None:
-    """The outline against points of three flat tapered blades, projected by the pinhole alone."""
-    hub, yaw, tilt, turn, cone = np.array([0.06, -0.04]), 0.2, 0.08, 0.5, np.deg2rad(2.5)
-    leading, trailing, length = 18.0, 40.0, 560.0
-    parameters = np.array([[*(616 * hub), turn, yaw, tilt, leading, trailing, 1 / length]])
-    shares = np.array([0.0, 0.5, 1.0])
-    drawn = outline(parameters, shares, CAMERA).points[0]
-    axes = rotation_of(0.0, -tilt, yaw)
-    first, last = 2.1 * (leading + trailing), 0.85 * length
+def test_the_model_draws_the_silhouette_of_solid_blades() -> None:
+    """The outline against points all over the skin of three blades, projected by the pinhole alone: the outermost of
+    each section to either side of the blade's axis."""
+    parameters = np.array([37.0, -24.6, 0.5, 0.2, 0.08, 0.6, np.log(560.0), 0.1, -0.05, 0.2, 0.01, 0.1])
+    drawn = outline(parameters[None], 9, CAMERA)[0]
+    profile = table(9)
+    axes = rotation_of(0.0, -parameters[4], parameters[3])
+    hub, radius = np.array([1.0, 37.0 / 616, -24.6 / 616]), 560.0 / 616
+    root, widest, tip = SHAPE * np.exp(parameters[[8, 7, 9]])
+    ring = np.linspace(0, 2 * np.pi, 2001)
     for b in range(3):
-        a = turn + b * 2 * np.pi / 3
-        along = axes @ np.array([-np.sin(cone), np.cos(cone) * np.cos(a), np.cos(cone) * np.sin(a)])
-        across = axes @ np.array([0.0, -np.sin(a), np.cos(a)])
-        for s, root in enumerate((leading, -trailing)):
-            for k, r in enumerate(first + (last - first) * shares):
-                p = 616 * np.array([1.0, *hub]) + r * along + root * (1 - r / length) * across
-                assert np.allclose(drawn[b, s, k], 616 * p[1:] / p[0], atol=1e-6)
-        step = 616 * np.array([1.0, *hub]) + along
-        seen = 616 * step[1:] / step[0] - 616 * hub
-        assert np.cos(directions(parameters[0], CAMERA)[b] - np.arctan2(seen[1], seen[0])) > 1 - 1e-6
+        a = parameters[2] + b * 2 * np.pi / 3
+        outward, across = np.array([0.0, np.cos(a), np.sin(a)]), np.array([0.0, -np.sin(a), np.cos(a)])
+        back = np.array([1.0, 0.0, 0.0])
+        span = np.cos(CONE) * outward - np.sin(CONE) * back
+        depth = np.cos(CONE) * back + np.sin(CONE) * outward
+        for k, (station, rise, fall, ratio, place, twist) in enumerate(profile):
+            chord = root + rise * (widest - root) + fall * (tip - widest)
+            thick = chord * (1 + (ratio * np.exp(0.1) - 1) * rise)
+            nose = (0.5 - (0.5 - THICKEST) * rise) * chord
+            front = (place + 0.01 * rise) * chord
+            ahead = np.append(front - nose + nose * np.cos(ring), front - chord)  # the nose, then the trailing edge
+            deep = np.append(thick / 2 * np.sin(ring), 0.0)
+            turn = 0.6 + twist
+            skin = ahead[:, None] * (np.cos(turn) * across - np.sin(turn) * depth)
+            skin = skin + deep[:, None] * (np.sin(turn) * across + np.cos(turn) * depth)
+            points = hub + radius * (station * span + skin) @ axes.T
+            seen = 616 * points[:, 1:] / points[:, :1]
+            middle = hub + radius * station * (axes @ span)
+            way = np.array([-np.sin(directions(parameters, CAMERA)[b]), np.cos(directions(parameters, CAMERA)[b])])
+            off = (seen - 616 * middle[1:] / middle[0]) @ way
+            expected = (drawn[b, :, k] - 616 * middle[1:] / middle[0]) @ way
+            assert expected[0] == pytest.approx(off.max(), abs=0.25)
+            assert expected[1] == pytest.approx(off.min(), abs=0.25)
