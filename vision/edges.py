@@ -66,9 +66,10 @@ def find_edges(
     believed = [
         c for c in candidates if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))
     ]
-    chosen = _choose([c for c in believed if not _hides_nothing(c, candidates, blade)], blade, largest)
+    clear = [c for c in believed if not _faint_behind_gaps(c, blade)]
+    chosen = _choose([c for c in clear if not _hides_nothing(c, candidates, blade)], blade, largest)
     if len(chosen) == 1:
-        chosen = with_partner(chosen[0], believed, blade, largest)
+        chosen = with_partner(chosen[0], clear, blade, largest)
     ending = None
     axis = float("nan") if expected is None else expected % np.pi
     closed = None
@@ -110,6 +111,13 @@ def _outshone(one: Candidate, candidates: list[Candidate]) -> bool:
         and abs(float(c.outward @ one.outward)) < np.cos(LARGEST_FLARE)
         for c in candidates
     )
+
+
+def _faint_behind_gaps(one: Candidate, blade: Blade) -> bool:
+    """Whether a step hardly clearer than the blade's own shade has dots missing before it: there the blade has ended,
+    too faintly to be seen, and this is of what is behind it."""
+    missing = one.empty / max(1 - one.empty, 1e-6) * len(blade.dots) / 2  # of the outer half of them
+    return one.step < PLAIN * blade.texture and missing >= LEAST_GONE
 
 
 def _hides_nothing(one: Candidate, candidates: list[Candidate], blade: Blade) -> bool:
