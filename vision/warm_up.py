@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.camera import Camera, RigGeometry
 from vision.capture import Image, StereoFrames
+from vision.far_view import find_rotor
 from vision.grid import expected_points
 from vision.mosaic import RED_AT
 from vision.observation import BladeObservation
@@ -19,13 +21,29 @@ Array = NDArray[Any]  # of floats
 DISTANCE_M = 3.0
 HALF_WIDTH = 0.55  # of the reach of the laser's grid to each side: where the blade's edges are
 BLADE, BACKGROUND, DOT = 170.0, 90.0, 70.0  # grey levels, and what a dot adds to green
+FAR_WIDTH = 300  # px, of the picture of a rotor
 DOT_PX = 1.6  # standard deviation of a dot at working size
 
 
 def warm_up(eye: Eye) -> BladeObservation:
-    """What the eye says of the specimen; takes seconds when its inner loops are not compiled yet, and compiled ones are
-    kept on disk."""
+    """What the eye says of the specimen, after a look at a rotor from afar; takes seconds when inner loops are not
+    compiled yet, and compiled ones are kept on disk."""
+    small = eye.geometry.stereo.left.shrunk(max(1, eye.geometry.stereo.left.width // FAR_WIDTH))
+    find_rotor(rotor(small), small)
     return eye.observe(specimen(eye.geometry, eye.factor))
+
+
+def rotor(camera: Camera) -> Image:
+    """Picture (h, w) of a tower with three blades, flat and square before the camera."""
+    image = np.full((camera.height, camera.width), BACKGROUND, np.uint8)
+    hub, radius = (np.array(image.shape[::-1]) - 1) / 2, 0.4 * camera.height
+    outlines = [np.array([[-0.03, 0.0], [0.03, 0.0], [0.04, 2.0], [-0.04, 2.0]])]
+    for turn in np.deg2rad([40.0, 160.0, 280.0]):
+        along, across = np.array([np.sin(turn), -np.cos(turn)]), np.array([np.cos(turn), np.sin(turn)])
+        outlines.append(np.array([across * 0.05, along * 0.25 + across * 0.06, along, -across * 0.05]))
+    for outline in outlines:
+        cv2.fillPoly(image, [np.rint(hub + radius * outline).astype(np.int32)], BLADE)
+    return image
 
 
 def specimen(geometry: RigGeometry, factor: int = 1) -> StereoFrames:
