@@ -32,8 +32,8 @@ USUAL_TILT = np.deg2rad(5.0)
 KNOWN = {
     YAW: (0.0, np.deg2rad(14.0)),
     TILT: (USUAL_TILT, np.deg2rad(5.0)),
-    CHORD: (0.0, 0.15),
-    ROOT: (0.0, 0.12),
+    CHORD: (0.0, 0.3),
+    ROOT: (0.0, 0.3),
     TIP: (0.0, 0.4),
     AXIS: (0.0, 0.03),
     THICKNESS: (0.0, 0.12),
