@@ -24,7 +24,7 @@ def image_plane(theta: float, rho: float, camera: Camera) -> Array:
 def straightened(edge: Edge, camera: Camera) -> tuple[float, float]:
     """(θ, ρ) of the edge as a camera without distortion would see it; θ along the edge's outward normal, ρ signed."""
     theta, rho = edge.line.theta, edge.line.rho
-    if any(camera.distortion):
+    if camera.bends:
         rays = camera.rays(edge.ends + camera.centre)
         first, last = rays[:, 1:] * (camera.fx, camera.fy) + (camera.cx, camera.cy) - camera.centre
         along = (last - first) / np.linalg.norm(last - first)

@@ -12,12 +12,13 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from vision.camera import Camera, StereoPair
+from vision.camera import Camera, Lens, StereoPair
 
 Array = NDArray[np.float64]
 
 FROM_OPENCV = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """(3, 3): a vector in OpenCV's camera axes in this project's camera axes."""
+REMEDY = "calibrate with Kalibr's pinhole-radtan or pinhole-equi"
 
 
 class CamchainError(ValueError):
@@ -80,7 +81,7 @@ def format_camchain(stereo: StereoPair) -> str:
             f"  cam_overlaps: [{1 - number}]",
             "  camera_model: pinhole",
             f"  distortion_coeffs: [{', '.join(_text(value) for value in camera.distortion)}]",
-            "  distortion_model: radtan",
+            f"  distortion_model: {camera.lens}",
             f"  intrinsics: [{', '.join(_text(v) for v in (camera.fx, camera.fy, camera.cx, camera.cy))}]",
             f"  resolution: [{camera.width}, {camera.height}]",
             f"  rostopic: /cam{number}/image_raw",
@@ -134,13 +135,14 @@ class _Section:
 
 
 def _camera(section: _Section) -> Camera:
-    for key, known, remedy in (
-        ("camera_model", "pinhole", "calibrate with pinhole-radtan"),
-        ("distortion_model", "radtan", "calibrate with pinhole-radtan"),
-    ):
-        model = section.value(key, known)
-        if model != known and (key, model) != ("distortion_model", "none"):
-            raise section.wrong(key, f"{str(model)[:40]!r} is not known; {known} is: {remedy}")
+    model = section.value("camera_model", "pinhole")
+    if model != "pinhole":
+        raise section.wrong("camera_model", f"{str(model)[:40]!r} is not known; pinhole is: {REMEDY}")
+    lens = section.value("distortion_model", "radtan")
+    if lens not in ("radtan", "equidistant", "none"):
+        raise section.wrong(
+            "distortion_model", f"{str(lens)[:40]!r} is not known; radtan, equidistant and none are: {REMEDY}"
+        )
     width, height = section.numbers("resolution", (2,), "[width, height] in pixels")
     if not (16 <= width <= 20000 and 16 <= height <= 20000 and width == int(width) and height == int(height)):
         raise section.wrong("resolution", f"[{width:g}, {height:g}] is no image size")
@@ -149,10 +151,13 @@ def _camera(section: _Section) -> Camera:
         raise section.wrong("intrinsics", f"focal lengths {fx:g} and {fy:g} px do not fit a width of {width:g} px")
     if not (0 <= cx <= width and 0 <= cy <= height):
         raise section.wrong("intrinsics", f"the principal point ({cx:g}, {cy:g}) lies outside the image")
-    k1 = k2 = p1 = p2 = 0.0
-    if section.value("distortion_model", "radtan") != "none":
-        k1, k2, p1, p2 = section.numbers("distortion_coeffs", (4,), "[k1, k2, p1, p2]")
-    return Camera(int(width), int(height), fx, fy, cx, cy, (float(k1), float(k2), float(p1), float(p2)))
+    coefficients = np.zeros(4)
+    if lens != "none":
+        names = "[k1, k2, p1, p2]" if lens == "radtan" else "[k1, k2, k3, k4]"
+        coefficients = section.numbers("distortion_coeffs", (4,), names)
+    k1, k2, k3, k4 = (float(k) for k in coefficients)
+    bending: Lens = "equidistant" if lens == "equidistant" else "radtan"
+    return Camera(int(width), int(height), fx, fy, cx, cy, (k1, k2, k3, k4), bending)
 
 
 def _nearest_rotation(matrix: Array) -> Array:
@@ -164,4 +169,6 @@ def _nearest_rotation(matrix: Array) -> Array:
 
 
 def _text(value: float) -> str:
-    return repr(float(value))
+    """The number as YAML writes it: without its point, 1e-05 would be read as a word."""
+    text = repr(float(value))
+    return text if "e" not in text or "." in text else text.replace("e", ".0e")

@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Bayer = Literal["rggb", "bggr", "grbg", "gbrg"]
+Lens = Literal["radtan", "equidistant"]
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera with the radial-tangential distortion (k1, k2, p1, p2) of OpenCV and Kalibr."""
+    """A pinhole camera whose lens bends as OpenCV and Kalibr have it. lens: radtan, the radial-tangential distortion
+    (k1, k2, p1, p2), or equidistant, that of fisheye lenses (k1, k2, k3, k4; Kannala and Brandt 2006)."""
 
     width: int
     height: int
@@ -29,6 +31,17 @@ class Camera:
     cx: float
     cy: float
     distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    lens: Lens = "radtan"
+
+    @property
+    def bends(self) -> bool:
+        """Whether straight lines may be bent in its image."""
+        return self.lens == "equidistant" or any(self.distortion)
+
+    @property
+    def pinhole(self) -> Camera:
+        """The camera with a lens that bends nothing."""
+        return replace(self, distortion=(0.0, 0.0, 0.0, 0.0), lens="radtan")
 
     @property
     def centre(self) -> Array:
@@ -46,34 +59,45 @@ class Camera:
         depth = points[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
             y, z = points[:, 1] / depth, points[:, 2] / depth
-        k1, k2, p1, p2 = self.distortion
         pixels = np.empty((len(points), 2))
-        yd, zd = y, z
-        if any(self.distortion):
-            yy, zz, yz = y * y, z * z, y * z
-            r2 = yy + zz
-            radial = 1 + r2 * (k1 + k2 * r2)
-            yd = y * radial + 2 * p1 * yz + p2 * (r2 + 2 * yy)
-            zd = z * radial + p1 * (r2 + 2 * zz) + 2 * p2 * yz
+        yd, zd = self._bent(y, z) if self.bends else (y, z)
         pixels[:, 0] = self.fx * yd + self.cx
         pixels[:, 1] = self.fy * zd + self.cy
         pixels[depth <= 0] = np.nan
         return pixels
 
     def rays(self, pixels: Array) -> Array:
-        """Directions (n, 3), scaled to x = 1, of pixels (n, 2): the inverse of `project` up to the depth."""
+        """Directions (n, 3), scaled to x = 1, of pixels (n, 2): the inverse of `project` up to the depth. A pixel
+        beyond all that the lens can see gets the ray of one near it."""
         pixels = np.asarray(pixels, float).reshape(-1, 2)
         if len(pixels) == 0:
             return np.empty((0, 3))
-        if any(self.distortion):
-            import cv2  # here, so that checking a mission file does not load OpenCV
+        yz = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
+        if self.bends:
+            from vision import lens_kernels  # here, so that checking a mission file does not load a compiler
 
-            yz = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, np.array(self.distortion)).reshape(-1, 2)
-        else:
-            yz = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
+            bent, yz = yz, np.empty_like(yz)
+            unbent = lens_kernels.unbent_radtan if self.lens == "radtan" else lens_kernels.unbent_equidistant
+            unbent(bent, np.array(self.distortion), yz)
         rays = np.empty((len(yz), 3))
         rays[:, 0], rays[:, 1:] = 1.0, yz
         return rays
+
+    def _bent(self, y: Array, z: Array) -> tuple[Array, Array]:
+        """Where the lens bends places (n,), (n,) in focal lengths off the optical axis to."""
+        yy, zz = y * y, z * z
+        if self.lens == "equidistant":
+            k1, k2, k3, k4 = self.distortion
+            off_axis = np.sqrt(yy + zz)
+            angle = np.arctan(off_axis)
+            s = angle * angle
+            bent = angle * (1 + s * (k1 + s * (k2 + s * (k3 + s * k4))))
+            share = np.divide(bent, off_axis, out=np.ones_like(bent), where=off_axis > 1e-12)
+            return y * share, z * share
+        k1, k2, p1, p2 = self.distortion
+        r2, yz = yy + zz, y * z
+        radial = 1 + r2 * (k1 + k2 * r2)
+        return y * radial + 2 * p1 * yz + p2 * (r2 + 2 * yy), z * radial + p1 * (r2 + 2 * zz) + 2 * p2 * yz
 
     def shrunk(self, factor: int) -> Camera:
         """The camera whose image is this one's averaged over blocks of factor × factor pixels (INTER_AREA)."""

@@ -37,7 +37,7 @@ TOLERANCES = np.array([2.0, 1.2, 0.8, 0.8])  # px: how far from the curve steps 
 def lens_bend(camera: Camera | None, point: Array, normal: Array) -> float:
     """Half the change of slope per px, 1/px, that the lens gives a straight edge through a point (2,) of the image
     frame, square to normal (2,)."""
-    if camera is None or not any(camera.distortion):
+    if camera is None or not camera.bends:
         return 0.0
     direction = np.array([-normal[1], normal[0]])
     places = point + np.array([[-LENS_PX], [0.0], [LENS_PX]]) * direction + camera.centre

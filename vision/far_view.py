@@ -6,7 +6,7 @@ stands before another point than the hub's centre.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -107,10 +107,10 @@ def _picture(image: Image, camera: Camera) -> Picture:
         planes = image.astype(np.float32)[..., None]
     rough = planes[:, 2:] - 2 * planes[:, 1:-1] + planes[:, :-2]
     noise = max(0.4, 1.4826 * float(np.median(np.abs(rough[::4]))) / np.sqrt(6.0))
-    if any(camera.distortion):
+    if camera.bends:
         planes = _straightened(planes, camera)
     blurred = cv2.GaussianBlur(planes, (0, 0), 1.0).reshape(planes.shape)
-    return Picture(blurred, replace(camera, distortion=(0.0, 0.0, 0.0, 0.0)), 0.5 * noise)
+    return Picture(blurred, camera.pinhole, 0.5 * noise)
 
 
 def _straightened(planes: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:

@@ -140,7 +140,7 @@ class Renderer:
 
     def distortion(self, camera: Camera) -> Distortion | None:
         """The bending of a camera's lens; None for a pinhole."""
-        if not any(camera.distortion):
+        if not camera.bends:
             return None
         if camera not in self._lenses:
             self._lenses[camera] = Distortion(camera)

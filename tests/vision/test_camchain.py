@@ -48,6 +48,7 @@ cameras = st.builds(
     st.floats(1000, 1500),
     st.floats(800, 1200),
     st.tuples(*[st.floats(-0.3, 0.3)] * 2, *[st.floats(-0.01, 0.01)] * 2),
+    st.sampled_from(["radtan", "equidistant"]),
 )
 
 
@@ -58,6 +59,11 @@ def test_what_is_written_is_read_again(left: Camera, right: Camera, angles: tupl
     again = parse_camchain(format_camchain(stereo))
     assert (again.left, again.right) == (left, right)
     assert np.allclose(again.rotation, stereo.rotation, atol=1e-12)
+    plain = yaml.safe_load(format_camchain(stereo))  # as another program reads it: nothing but numbers, however small
+    for number, eye in enumerate((left, right)):
+        assert tuple(plain[f"cam{number}"]["distortion_coeffs"]) == eye.distortion
+        assert plain[f"cam{number}"]["distortion_model"] == eye.lens
+    assert all(isinstance(value, float) for row in plain["cam1"]["T_cn_cnm1"] for value in row)
     assert np.allclose(again.translation, stereo.translation, atol=1e-12)
 
 
@@ -96,7 +102,7 @@ def test_a_right_camera_to_the_right_has_its_baseline_along_minus_y() -> None:
         (("intrinsics: [2464.0, 2463.5, 1223.0, 1024.0]", "intrinsics: [8.5, 8.5, 1223, 1024]"), 6, "8.5"),
         (("intrinsics: [2460, 2460, 1220, 1020]", "intrinsics: [2460, 2460, 9220, 1020]"), 18, "outside"),
         (("camera_model: pinhole", "camera_model: omni"), 3, "pinhole"),
-        (("distortion_model: radtan", "distortion_model: equidistant"), 5, "radtan"),
+        (("distortion_model: radtan", "distortion_model: fov"), 5, "pinhole-radtan or pinhole-equi"),
         (("-0.2]", "-200.0]"), 11, "in metres"),
         (("[1.0, 0.0, 0.0, -0.2]", "[1.0, 0.5, 0.0, -0.2]"), 11, "rotation"),
         (("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 1.0]"), 11, "4 x 4"),

@@ -112,6 +112,30 @@ def test_fewer_images_still_give_distance_and_edges_where_the_rig_is_known(
     assert len(seen["dots"]["left"]) > 20 and len(seen["edges"]) == 2
 
 
+def test_images_of_fisheyes_are_measured_as_well(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    straight = np.array([[616.0, 0, 305.5], [0, 616.0, 255.5], [0, 0, 1]])
+    bends = np.array([0.02, -0.01, 0.0, 0.0])
+    v, u = (grid.ravel() for grid in np.mgrid[0:512, 0:612].astype(float))
+    from_where = cv2.fisheye.undistortPoints(np.column_stack([u, v])[:, None], straight, bends, P=straight)
+    from_where = from_where.reshape(512, 612, 2).astype(np.float32)
+    for name in NAMES:
+        image = cv2.imread(str(folder / f"{name}.png"))
+        bent = cv2.remap(image, from_where, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        cv2.imwrite(str(tmp_path / f"{name}.png"), bent)
+    (tmp_path / "rig.yaml").write_text(RIG)
+    fisheye = "distortion_coeffs: [0.02, -0.01, 0, 0]\n  distortion_model: equidistant\n"
+    chain = CAMCHAIN.replace("distortion_coeffs: [0.0, 0.0, 0.0, 0.0]\n  distortion_model: radtan\n", fisheye)
+    (tmp_path / "camchain.yaml").write_text(chain.replace("distortion_coeffs: []\n  distortion_model: none\n", fisheye))
+    plain = seen_in(folder, folder / "rig.yaml", capsys)
+    seen = seen_in(tmp_path, tmp_path / "rig.yaml", capsys)
+    assert seen["valid"] and seen["distance_m"] == pytest.approx(3.0, rel=0.01)
+    assert abs(len(seen["matches"]) - len(plain["matches"])) <= 8
+    assert seen["chord_m"] == pytest.approx(0.9, rel=0.03)
+    assert seen["heading_deg"] == pytest.approx(plain["heading_deg"], abs=1.0)
+
+
 def test_one_photograph_needs_no_rig_and_has_no_distance(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     seen = seen_in(folder / "left_laser.png", None, capsys)
     assert len(seen["dots"]["left"]) > 20 and seen["distance_m"] is None and seen["dots"]["right"] == []
@@ -187,7 +211,7 @@ def test_a_wall_of_one_grey_is_refused_in_words_with_all_keys(
         ("large.png", "rig.yaml", "1224 × 1024 pixels, the rig's camera has 612 × 512; give them as the camera took"),
         ("left.png", "blind.yaml", "names no camera .* say camchain: "),
         ("left.png", "lost.yaml", "elsewhere.yaml: no such file"),
-        ("left.png", "fisheye.yaml", "fisheye_chain.yaml:6: distortion_model of cam0: 'equidistant' is not known"),
+        ("left.png", "fisheye.yaml", "fisheye_chain.yaml:6: distortion_model of cam0: 'fov' is not known"),
         ("left.png", "nothing.yaml", "nothing.yaml"),
         ("left.png", "typing.yaml", "typing.yaml:2:.*fan"),
     ],
@@ -197,7 +221,7 @@ def test_what_is_wrong_is_one_clear_line(folder: Path, images: str, rig: str | N
     (folder / "blind.yaml").write_text("kind: hardware\n")
     (folder / "lost.yaml").write_text("camchain: elsewhere.yaml\n")
     (folder / "fisheye.yaml").write_text("camchain: fisheye_chain.yaml\n")
-    (folder / "fisheye_chain.yaml").write_text(CAMCHAIN.replace("radtan", "equidistant"))
+    (folder / "fisheye_chain.yaml").write_text(CAMCHAIN.replace("radtan", "fov"))
     (folder / "typing.yaml").write_text(RIG.replace("28.2", "wide"))
     (folder / "hollow.png").write_bytes(b"")
     (folder / "empty").mkdir(exist_ok=True)
