@@ -20,7 +20,7 @@ from vision.closing import contradicted, evidence_of, find_closed, goes_on, oppo
 from vision.edge_fit import lens_bend, settled, trimmed
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
-from vision.lines import edge_pixels, hough_lines, sensor_noise
+from vision.lines import hough_lines, sensor_noise
 from vision.observation import Edge, Line
 from vision.unwitnessed import MOST_EMPTY, like_an_edge, typical_edge
 
@@ -55,9 +55,8 @@ def find_edges(
     """The blade's edges, axis and end. tones (h, w, c): working image, free of dots; smooth: the same `smoothed`.
     expected: direction of the axis in the image (rad, modulo π) where it is known beforehand; lines that run otherwise
     are then none of the blade's edges."""
-    height, width = tones.shape[:2]
     noise = sensor_noise(tones)
-    lines, _ = hough_lines(edge_pixels(tones, noise), 220, (width, height))
+    lines = hough_lines(tones, noise, 220)
     if expected is not None:
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smooth, noise, other)

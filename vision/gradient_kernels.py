@@ -15,6 +15,11 @@ Integers = NDArray[Any]
 
 SUM = 36  # what a gradient is written as, in grey levels per px of the half-size image
 LEVEL, LEVELS = 9, 5441  # strengths that are counted as one, and how many such there are
+GATHER = np.uint64(0x0102040810204080)  # brings the lowest bits of eight bytes together in the highest byte
+NUMBER = np.array([bin(byte).count("1") for byte in range(256)])  # of set bits in a byte
+SET = np.zeros((256, 8), np.uint8)  # and which these are, the first ones first
+for _byte in range(256):
+    SET[_byte, : NUMBER[_byte]] = [bit for bit in range(8) if _byte >> bit & 1]
 
 
 @compiled
@@ -58,7 +63,11 @@ def gradients(tones: Image, dx: Integers, dy: Integers, strength: Integers) -> N
     for c in range(channels):
         for y in range(height):
             top, bottom, sums = flat[2 * y * step + c :], flat[(2 * y + 1) * step + c :], half[y & 7]
-            if channels == 2:  # two loops, so that each has a stride that is known
+            if channels == 1:  # loops of their own, so that each has a stride that is known
+                for x in range(width):
+                    left = np.int16(top[2 * x]) + np.int16(bottom[2 * x])
+                    sums[x] = np.int16(left + np.int16(top[2 * x + 1]) + np.int16(bottom[2 * x + 1]))
+            elif channels == 2:
                 for x in range(width):
                     left = np.int16(top[4 * x]) + np.int16(bottom[4 * x])
                     sums[x] = np.int16(left + np.int16(top[4 * x + 2]) + np.int16(bottom[4 * x + 2]))
@@ -83,12 +92,12 @@ def gradients(tones: Image, dx: Integers, dy: Integers, strength: Integers) -> N
                 for x in range(width - 4):
                     row_dy[x] = np.int16(o0[x] + o4[x] + 3 * (o1[x] + o3[x]) + 4 * o2[x])
                 for x in range(width - 4):
-                    row[x] = np.uint16(abs(np.int32(row_dx[x])) + abs(np.int32(row_dy[x])))
+                    row[x] = np.uint16(abs(row_dx[x]) + abs(row_dy[x]))
                 continue
             for x in range(width - 4):
                 across = np.int16(e4[x] + e3[x] - e1[x] - e0[x])
                 down = np.int16(o0[x] + o4[x] + 3 * (o1[x] + o3[x]) + 4 * o2[x])
-                size = np.uint16(abs(np.int32(across)) + abs(np.int32(down)))
+                size = np.uint16(abs(across) + abs(down))
                 stronger = size > row[x]
                 row_dx[x] = across if stronger else row_dx[x]
                 row_dy[x] = down if stronger else row_dy[x]
@@ -101,20 +110,26 @@ def ridge(dx: Integers, dy: Integers, strength: Integers, least: int, most: int)
     step, about the `most` strongest of them. angle: of the gradient, rad, to 3e-4; weight: at most one, which ten times
     the strength has that they all reach."""
     height, width = strength.shape
-    at_least = np.int32(least)
-    is_ridge = np.empty(width, np.uint8)
-    places = np.empty(strength.size + width, np.int32)
+    at_least = np.uint16(least)
+    flags = np.zeros((width + 5) // 8 * 8, np.uint8)
+    eights = flags.view(np.uint64)
+    places = np.empty(strength.size + 8, np.int32)
     count = 0
     for y in range(2, height - 2):
         row_dx, row_dy, row = dx[y, 1:], dy[y, 1:], strength[y, 1:]
         above, below, before, after = strength[y - 1, 1:], strength[y + 1, 1:], strength[y], strength[y, 2:]
         for x in range(width - 2):
-            upright = abs(np.int32(row_dx[x])) >= abs(np.int32(row_dy[x]))
-            beside = max(before[x], after[x]) if upright else max(above[x], below[x])
-            is_ridge[x] = (np.int32(row[x]) > at_least) & (row[x] >= beside)
-        for x in range(width - 2):
-            places[count] = y * width + x + 1
-            count += is_ridge[x]
+            beside, over = max(before[x], after[x]), max(above[x], below[x])
+            upright = np.uint16(abs(row_dx[x])) >= np.uint16(abs(row_dy[x]))
+            highest = beside if upright else over
+            flags[x] = np.uint8((row[x] > at_least) & (row[x] >= highest))
+        for eight in range(len(eights)):  # each eighth flag is a bit of a byte that tells where the set ones are
+            byte = (eights[eight] * GATHER) >> np.uint64(56)
+            first = np.int32(y * width + 1 + 8 * eight)
+            found, room = SET[byte], places[count:]
+            for k in range(8):
+                room[k] = first + np.int32(found[k])
+            count += NUMBER[byte]
     flat = strength.ravel()
     if count > most:
         counts = np.zeros(LEVELS, np.int64)
@@ -124,21 +139,24 @@ def ridge(dx: Integers, dy: Integers, strength: Integers, least: int, most: int)
         while level > 0 and reached < most:
             level -= 1
             reached += counts[level]
-        at_least = max(at_least, np.int32(LEVEL * level))
+        at_least = max(at_least, np.uint16(LEVEL * level))
         kept = 0
         for k in range(count):
             places[kept] = places[k]
             kept += int(flat[places[k]] >= at_least)
         count = kept
-    found = np.empty((4, count), np.float32)
+    pixels = np.empty((4, count), np.float32)
     flat_dx, flat_dy = dx.ravel(), dy.ravel()
-    u, v, angle, weight = found[0], found[1], found[2], found[3]
+    u, v, angle, weight = pixels[0], pixels[1], pixels[2], pixels[3]
     for k in range(count):
         at = places[k]
-        u[k], v[k], angle[k], weight[k] = at % width, at // width, flat_dx[at], flat_dy[at]
+        angle[k], weight[k] = flat_dx[at], flat_dy[at]
     none, one, right, straight = np.float32(0), np.float32(1), np.float32(np.pi / 2), np.float32(np.pi)
     full = np.float32(1 / (5 * np.float32(at_least)))
     c3, c2, c1 = np.float32(-0.0464964749), np.float32(0.15931422), np.float32(-0.327622764)
+    for k in range(count):
+        row_number = np.floor((places[k] + 0.5) * (1.0 / width))
+        u[k], v[k] = places[k] - row_number * width, row_number
     for k in range(count):
         x, y = angle[k], weight[k]
         wide, high = abs(x), abs(y)
@@ -149,33 +167,44 @@ def ridge(dx: Integers, dy: Integers, strength: Integers, least: int, most: int)
         turn = straight - turn if x < none else turn
         angle[k] = -turn if y < none else turn
         weight[k] = min(np.sqrt(x * x + y * y) * full, one)
-    return found
+    return pixels
 
 
 @compiled
 def line_votes(
-    position: Floats, angle: Floats, weight: Floats, spread: int, reach: float, rho_step: float, votes: Floats
+    pixels: Floats, first: tuple[float, float], spread: int, reach: float, rho_step: float, votes: Floats
 ) -> None:
-    """Each pixel's weight added to votes (angles, bins) at its own angle modulo π and `spread` bins beside it.
-
-    position (n, 2) in px, angle (n,) of the gradient, rad. A line's offset rho is in bin (rho + reach) / rho_step + 1.
-    """
+    """Written: the weight of each pixel, of n as of `ridge`, in votes (angles, bins) at its own angle modulo π and
+    `spread` bins beside it. first: place of the first pixel in the image frame of the image of twice the size, px; a
+    line's offset rho there is in bin (rho + reach) / rho_step + 1."""
     angles, bins = votes.shape
     cosine, sine = np.empty(angles), np.empty(angles)
     for a in range(angles):
         cosine[a], sine[a] = np.cos((a + 0.5) * np.pi / angles), np.sin((a + 0.5) * np.pi / angles)
-    for k in range(len(position)):
-        own = int(np.floor(angle[k] * (angles / np.pi)))
-        for step in range(-spread, spread + 1):
-            a = own + step
-            while a < 0:
-                a += angles
-            while a >= angles:
-                a -= angles
-            rho = position[k, 0] * cosine[a] + position[k, 1] * sine[a]
-            r = int((rho + reach) / rho_step + 1.5)
-            if 0 <= r < bins:
-                votes[a, r] += weight[k]
+    u, v, angle, weight = pixels[0], pixels[1], pixels[2], pixels[3]
+    count, ways = pixels.shape[1], 2 * spread + 1
+    # loop by loop, so that all but gathering and adding is reckoned side by side
+    turn, place = np.empty(count, np.uint32), np.empty((ways, count), np.uint32)
+    across, down = np.empty(count), np.empty(count)
+    per_rad, per_px, nowhere = angles / np.pi, 1 / rho_step, np.uint32(votes.size)
+    for way in range(ways):
+        row = place[way]
+        for k in range(count):
+            a = np.int32(np.floor(angle[k] * per_rad)) + np.int32(way - spread)
+            a = a + np.int32(angles) if a < 0 else a
+            a = a + np.int32(angles) if a < 0 else a
+            turn[k] = a - np.int32(angles) if a >= angles else a
+        for k in range(count):
+            across[k], down[k] = cosine[turn[k]], sine[turn[k]]
+        for k in range(count):
+            x, y = 2.0 * u[k] + first[0], 2.0 * v[k] + first[1]
+            r = np.int32((x * across[k] + y * down[k] + reach) * per_px + 1.5)
+            row[k] = np.uint32(turn[k] * bins + r) if (r >= 0) & (r < bins) else nowhere
+    flat = np.zeros(votes.size + 1, np.float32)
+    for k in range(count):
+        for way in range(ways):
+            flat[place[way, k]] += weight[k]
+    votes[:] = flat[: votes.size].reshape(votes.shape)
 
 
 @compiled

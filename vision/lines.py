@@ -34,29 +34,6 @@ def sensor_noise(tones: Image) -> float:
     return max(0.6, 1.4826 * float(median_roughness(tones)) / float(np.sqrt(6.0)))
 
 
-@dataclass(frozen=True)
-class Gradients:
-    """Edge pixels of the half-size image: position (n, 2) in px of the working image's frame, direction, weight ≤ 1."""
-
-    position: Array
-    angle: Array
-    weight: Array
-
-
-def edge_pixels(tones: Image, noise: float) -> Gradients:
-    """Pixels whose brightness changes by more than noise, where it changes most."""
-    size = (tones.shape[0] // 2, tones.shape[1] // 2)
-    dx, dy = lent("dx", size, np.int16), lent("dy", size, np.int16)
-    strength = lent("strength", size, np.uint16)
-    gradients(np.ascontiguousarray(tones), dx, dy, strength)
-    least = round(2 * SUM * max(2.0, 1.4 * noise))
-    u, v, angle, weight = ridge(dx, dy, strength, least, MOST_PIXELS)
-    centre = (np.array(tones.shape[1::-1]) - 1) / 2
-    position = np.empty((len(u), 2))
-    position[:, 0], position[:, 1] = 2.0 * u + (0.5 - centre[0]), 2.0 * v + (0.5 - centre[1])
-    return Gradients(position, angle, weight)
-
-
 def smoothed(tones: Image, room: Image | None = None) -> Image:
     """A 3 × 3 mean of tones (h, w, c), of the same shape; room: where to write it."""
     return np.asarray(cv2.blur(tones, (3, 3), room), np.uint8).reshape(tones.shape)
@@ -75,14 +52,18 @@ def sampled(image: Image, u: Array, v: Array) -> NDArray[np.float32]:
     return np.asarray(values.reshape(*u.shape, -1), np.float32)
 
 
-def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Array, Array]:
-    """(theta, rho) (k, 2) with theta in [0, π) and signed rho in working px, and votes (k,), the strongest first.
-
-    size: (width, height) of the working image.
-    """
-    reach = float(np.hypot(*size)) / 2
-    table = np.zeros((ANGLES, int(2 * reach / RHO_STEP) + 3), np.float32)
-    line_votes(pixels.position, pixels.angle, pixels.weight, SPREAD, reach, RHO_STEP, table)
+def hough_lines(tones: Image, noise: float, most: int) -> Array:
+    """(theta, rho) (k, 2) of the lines that most steps lie on, of those that exceed the noise; with theta in [0, π) and
+    signed rho in px of the image frame of tones (h, w, c), the strongest first."""
+    size = (tones.shape[0] // 2, tones.shape[1] // 2)
+    dx, dy = lent("dx", size, np.int16), lent("dy", size, np.int16)
+    strength = lent("strength", size, np.uint16)
+    gradients(np.ascontiguousarray(tones), dx, dy, strength)
+    pixels = ridge(dx, dy, strength, round(2 * SUM * max(2.0, 1.4 * noise)), MOST_PIXELS)
+    reach = float(np.hypot(*tones.shape[:2])) / 2
+    table = np.empty((ANGLES, int(2 * reach / RHO_STEP) + 3), np.float32)
+    first = (0.5 - (tones.shape[1] - 1) / 2, 0.5 - (tones.shape[0] - 1) / 2)
+    line_votes(pixels, first, SPREAD, reach, RHO_STEP, table)
     angle, place = np.empty((2, table.size // 4), np.int64)
     strength = np.empty(table.size // 4)
     count = line_peaks(table, LEAST_VOTES, angle, place, strength)
@@ -90,7 +71,7 @@ def hough_lines(pixels: Gradients, most: int, size: tuple[int, int]) -> tuple[Ar
     lines = np.empty((len(order), 2))
     lines[:, 0] = (angle[order] + 0.5) * (np.pi / ANGLES)
     lines[:, 1] = (place[order] - 1) * RHO_STEP - reach
-    return lines, strength[order]
+    return lines
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vision.camera import Bayer
 from vision.capture import Image
-from vision.compiled import compiled
+from vision.mean_kernels import green_and_tones, half_of_green, half_of_grey
 from vision.mosaic import reduce_mosaic
 from vision.workspace import lent
 
@@ -58,10 +58,10 @@ def tones(image: Image) -> Image:
 
 def half_green(image: Image) -> Image:
     """The green of an image (h, w) or (h, w, 3), averaged over blocks of 2 × 2 pixels."""
-    if image.ndim == 2 or image.shape[0] % 2 or image.shape[1] % 2:
+    if image.shape[0] % 2 or image.shape[1] % 2:
         return np.asarray(cv2.resize(green(image), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     half = np.empty((image.shape[0] // 2, image.shape[1] // 2), np.uint8)
-    _half_green(np.ascontiguousarray(image).reshape(-1), half)
+    (half_of_grey if image.ndim == 2 else half_of_green)(np.ascontiguousarray(image).reshape(-1), half)
     return half
 
 
@@ -71,40 +71,8 @@ def half_green_and_tones(image: Image, purpose: str) -> tuple[Image, Image]:
         return half_green(image), tones(image)
     height, width = image.shape[:2]
     half, both = np.empty((height // 2, width // 2), np.uint8), lent(purpose, (height, width, 2), np.uint8)
-    _apart(np.ascontiguousarray(image).reshape(-1), both.reshape(-1), half)
+    green_and_tones(np.ascontiguousarray(image).reshape(-1), both.reshape(-1), half)
     return half, both
-
-
-@compiled
-def _half_green(image: Image, half: Image) -> None:
-    height, width = half.shape
-    sums = np.empty(width, np.uint16)
-    for v in range(height):
-        upper, lower = image[12 * v * width :], image[(12 * v + 6) * width :]
-        out = half[v]
-        for u in range(width):
-            sums[u] = np.uint16(upper[6 * u + 1]) + np.uint16(upper[6 * u + 4])
-        for u in range(width):
-            both = sums[u] + np.uint16(lower[6 * u + 1]) + np.uint16(lower[6 * u + 4])
-            out[u] = np.uint8((both + np.uint16(2)) >> np.uint16(2))
-
-
-@compiled
-def _apart(image: Image, both: Image, half: Image) -> None:
-    height, width = half.shape
-    lines = np.empty((2, 2 * width), np.uint8)
-    upper, lower = lines[0], lines[1]
-    for v in range(height):
-        for i in range(2):
-            row, tones, line = image[6 * (2 * v + i) * width :], both[4 * (2 * v + i) * width :], lines[i]
-            for u in range(2 * width):
-                tones[2 * u] = row[3 * u]
-                line[u] = row[3 * u + 1]
-                tones[2 * u + 1] = row[3 * u + 2]
-        out = half[v]
-        for u in range(width):
-            left, right = np.uint16(upper[2 * u]) + np.uint16(lower[2 * u]), np.uint16(upper[2 * u + 1])
-            out[u] = np.uint8((left + right + np.uint16(lower[2 * u + 1]) + np.uint16(2)) >> np.uint16(2))
 
 
 def to_full(pixels: Array, factor: int) -> Array:

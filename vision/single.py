@@ -15,7 +15,7 @@ from vision.dot_grid import DotGrid, find_dot_grid, resized
 from vision.edges import Found, edge_of, find_edges
 from vision.evidence import Blade, texture_between
 from vision.laser_fan import Fan, fan_of, middle_place
-from vision.lines import edge_pixels, hough_lines, sensor_noise, smoothed
+from vision.lines import hough_lines, sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
 from vision.quality import exposure, sharpness
 from vision.reduction import tones
@@ -131,7 +131,7 @@ def _outline(clean: Image, dots: Array, places: Array, fan: Fan, in_view: NDArra
     smooth, size = smoothed(clean), (clean.shape[1], clean.shape[0])
     texture = texture_between(smooth, dots + (np.array(size) - 1) / 2)
     strays = max(Blade.strays, STRAYS / len(dots))
-    lines, _ = hough_lines(edge_pixels(clean, sensor_noise(clean)), MOST_LINES, size)
+    lines = hough_lines(clean, sensor_noise(clean), MOST_LINES)
     refused = None
     for absent in (fan.central(middle), fan.certain()):
         blade = Blade(dots, places[absent & in_view], texture, strays=strays, grid_known=False)
