@@ -34,6 +34,7 @@ LEAST_SUPPORT = 0.5
 LEAST_SEEN = 0.38  # the same of a line beyond which dots are missing and before which none are
 FOLLOWED_PX = 25.0  # of a step that a line follows, worth as much as one unit of what else speaks for it
 ALIKE = cos(radians(4.0))  # of the angle between lines that may be one
+FEW_MISSING = 0.05  # of the dots up to a line: so many are overlooked
 LEAST_RUN = 50.0  # px: a shorter stretch of an edge with no dots beside it is none
 
 
@@ -164,7 +165,11 @@ def _weighed(
     clear += 0.35 * np.clip(np.log2(np.maximum(step, 1e-9) / max(blade.texture, 1.0)), -2.0, 1.0)
     clear += np.where(np.isnan(told), 0.2, np.where(told > 0.5, 0.6 * told, -7.0 * (0.5 - told))) - 5.0 * crossed
 
+    # What lies before a step at the blade's own depth, with no dots missing up to it, is a seam or a shadow.
+    behind = 1.0 - np.clip(np.nan_to_num(told - 0.5) / 0.4, 0.0, 1.0)
+
     def sums(hidden: Array, empty: Array, beyond: Array) -> Array:
+        hidden = hidden * np.where(empty < FEW_MISSING, behind, 1.0)
         against = 2.0 * hidden + 3.0 * np.maximum(hidden - 0.5, 0.0) + (5.0 if blade.grid_known else 2.5) * empty
         return np.asarray(clear - against + 0.15 * np.minimum(beyond, 6))
 

@@ -28,6 +28,7 @@ PAST_PX = 60.0  # past its apex, over which a side of a spike must not go on
 MOST_PAST = 0.6  # of that stretch, on which a step may be seen all the same
 LEAST_PARTNER = -0.2  # worth of an edge beside which no dots lie
 LEAST_WORTH = -1.0  # of an edge behind a spike
+TOLD = 0.9  # of a step seen by the other eye at the blade's depth: such a one is there, wherever it is lost
 BORDER = 14.0  # px: an edge that is seen to within this of the image border has not ended
 
 
@@ -92,7 +93,8 @@ def contradicted(edges: tuple[Candidate, ...]) -> bool:
     """Whether more speaks against edges that are seen nowhere else than where they are lost than for them."""
     total = 0.0
     for edge in edges:
-        total += float(side_of(edge, edge.profile.direction[edge.index]).evidence.sum()) + WORTH * edge.worth
+        least = 0.0 if edge.parallax > TOLD and edge.beyond > 0 and edge.empty == 0 else -np.inf
+        total += max(side_of(edge, edge.profile.direction[edge.index]).sums[-1], least) + WORTH * edge.worth
     return total < 0
 
 

@@ -31,6 +31,7 @@ LARGEST_TAPER = np.deg2rad(16)
 LARGEST_FLARE = np.deg2rad(28)  # of the root; so much is believed only where the axis is known
 LEAST_VALUE = 1.2
 MOST_MISSING = 0.35  # of the dots within the edges, beyond which they are not believed
+NOT_THERE = 0.25  # of a step that the other eye sees at the blade's depth: with less it is behind the blade
 LEAST_GONE = 3  # missing dots between two steps that tell which of them is the edge
 PLAIN = 2.5  # times the blade's own texture: a step that needs no other witness to be an edge
 BEHIND_SHOULDER = 12.0  # px: so far behind it an end no longer bends the edges
@@ -61,10 +62,9 @@ def find_edges(
         lines = lines[np.abs(np.cos(lines[:, 0] - expected)) < np.sin(FROM_EXPECTED)]
     candidates = weigh(lines, blade, smooth, noise, other)
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
-    typical = typical_edge(candidates)
-    believed = [
-        c for c in candidates if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))
-    ]
+    there = [c for c in candidates if not c.parallax < NOT_THERE]
+    typical = typical_edge(there)
+    believed = [c for c in there if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))]
     clear = [c for c in believed if not _faint_behind_gaps(c, blade)]
     chosen = _choose([c for c in clear if not _hides_nothing(c, candidates, blade)], blade, largest)
     if len(chosen) == 1:
