@@ -19,7 +19,7 @@ class BoardViews:
 
     image_size (width, height). board (n, 3): the corners on the board, in units of one square. left, right: for each
     view (n, 2) in pixels, or None where that camera did not see the whole board. square_m: the length of a square where
-    known.
+    known. names: what the views are called; by their numbers where there are none.
     """
 
     image_size: tuple[int, int]
@@ -27,6 +27,11 @@ class BoardViews:
     left: tuple[Array | None, ...]
     right: tuple[Array | None, ...]
     square_m: float | None = None
+    names: tuple[str, ...] = ()
+
+    def name(self, view: int) -> str:
+        """What a view is called."""
+        return self.names[view] if self.names else f"view {view + 1}"
 
 
 def find_corners(image: NDArray[np.uint8], columns: int, rows: int) -> Array | None:
@@ -44,6 +49,17 @@ def find_corners(image: NDArray[np.uint8], columns: int, rows: int) -> Array | N
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 1e-3)
     refined = cv2.cornerSubPix(grey, corners.reshape(-1, 1, 2), (reach, reach), (-1, -1), stop)
     return np.asarray(refined, float).reshape(-1, 2)
+
+
+def turned_alike(left: Array, right: Array, columns: int, rows: int) -> Array:
+    """The corners (rows * columns, 2) that the right camera saw, counted from the corner of the board that the left one
+    counts from: two cameras side by side see the board turned nearly alike. A board that looks the same upside down, of
+    an even number of corners both ways or an odd one, is else counted from either end."""
+    grid = right.reshape(rows, columns, 2)
+    ways = [np.rot90(grid, quarter) for quarter in ((0, 2) if columns != rows else range(4))]
+    centred = left - left.mean(axis=0)
+    best = max(ways, key=lambda way: float((centred * (way.reshape(-1, 2) - right.mean(axis=0))).sum()))
+    return np.ascontiguousarray(best.reshape(-1, 2))
 
 
 def board_points(columns: int, rows: int) -> Array:

@@ -6,7 +6,7 @@ wrong. Then the focal lengths are held at the lens's nominal one instead of bein
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.board import BoardViews
-from vision.calibration_doubts import WANTED_VIEWS, doubts_of
-from vision.calibration_fit import CELLS, CameraFit, Nominal
+from vision.calibration_doubts import WANTED_VIEWS, conditions_of, doubts_of
+from vision.calibration_fit import CELLS, CalibrationError, CameraFit, Nominal, View
+from vision.calibration_pairs import between, epipolar_error, fits_badly
 from vision.camchain import stereo_of_opencv
 from vision.camera import Camera, StereoPair
 
@@ -24,10 +25,9 @@ Array = NDArray[np.float64]
 Choice = Literal["auto", "free", "held"]
 
 FEWEST_VIEWS = 3
-
-
-class CalibrationError(ValueError):
-    """The data cannot be calibrated from at all; one line for a person."""
+ROUGH_VIEW, ROUGH_PX = 4.0, 0.3  # times the usual error, and px: beyond both a view's corners are no board's
+HOPELESS = 0.004  # of the image's width: an error that no pair has whose focal lengths are known
+EYES = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class StereoFit:
     """The calibrated pair. epipolar_px: rms distance of corners from the epipolar line of their partner. free: both
     cameras with nothing held, for comparison; held: the same at the nominal focal length, None where it is unknown.
     chosen: which of the two the result is built on. warnings: in plain words, why it may not be trusted. square_m:
-    length of a square, from the board or from the nominal baseline."""
+    length of a square, from the board or from the nominal baseline. views: every view, those that did not count too."""
 
     stereo: StereoPair
     left: CameraFit
@@ -48,6 +48,7 @@ class StereoFit:
     square_m: float
     scale_from: Literal["board", "baseline"]
     warnings: tuple[str, ...]
+    views: tuple[View, ...]
 
 
 def fit_camera(
@@ -109,9 +110,10 @@ def calibrate_stereo(views: BoardViews, nominal: Nominal | None = None, choice: 
     """Both cameras and the rigid motion between them, rotation kept.
 
     choice: 'free' fits the focal lengths, 'held' keeps the nominal one, 'auto' takes 'free' unless its data are badly
-    conditioned.
+    conditioned. Views that do not fit the others, of one camera or of the pair, are left out.
 
-    Raises: CalibrationError: too few views, no scale, or 'held' without a nominal focal length.
+    Raises: CalibrationError: too few views, no scale, cameras that do not fit together, or 'held' without a nominal
+    focal length.
     """
     nominal = nominal or Nominal()
     if choice == "held" and nominal.focal_px is None:
@@ -120,84 +122,119 @@ def calibrate_stereo(views: BoardViews, nominal: Nominal | None = None, choice: 
         raise CalibrationError(
             "the size of a square is unknown, and so is the nominal baseline: one of them gives the scale"
         )
-    sides = (views.left, views.right)
-    seen = [[corners for corners in side if corners is not None] for side in sides]
-    free = tuple(fit_camera(views.board, side, views.image_size) for side in seen)
+    sides = [
+        {k: corners for k, corners in enumerate(side) if corners is not None} for side in (views.left, views.right)
+    ]
+    free, rough = zip(*(_fitting(views, side) for side in sides), strict=True)
+    seen = [{k: corners for k, corners in side.items() if k not in bad} for side, bad in zip(sides, rough, strict=True)]
     held = None
     if nominal.focal_px is not None:
-        held = tuple(fit_camera(views.board, side, views.image_size, nominal.focal_px) for side in seen)
+        held = [fit_camera(views.board, [*side.values()], views.image_size, nominal.focal_px) for side in seen]
     doubts = doubts_of(free[0], free[1], nominal)
     chosen: Literal["free", "held"] = "held" if choice == "held" or (choice == "auto" and doubts and held) else "free"
     left, right = held if chosen == "held" and held is not None else free
-    both = [(a, b) for a, b in zip(views.left, views.right, strict=True) if a is not None and b is not None]
+    both = [k for k in seen[0] if k in seen[1]]
     if not both:
         raise CalibrationError("no view shows the board to both cameras")
-    rms, rotation, shift = _between(views.board, both, left.camera, right.camera)
-    apart = float(np.linalg.norm(shift))
-    square = views.square_m if views.square_m is not None else (nominal.baseline_m or 0.0) / apart
+    pairs = [(seen[0][k], seen[1][k]) for k in both]
+    alone = max(left.rms_px, right.rms_px)
+    rotation, shift, together, rms = between(views.board, pairs, left.camera, right.camera, alone)
+    if not doubts and rms > HOPELESS * left.camera.width:
+        raise CalibrationError(
+            f"the two cameras do not fit together: {rms:.1f} px, where each alone has {alone:.2f} px: were both "
+            "pictures of a pair taken at the same time, and their corners listed alike?"
+        )
+    square = (
+        views.square_m if views.square_m is not None else (nominal.baseline_m or 0.0) / float(np.linalg.norm(shift))
+    )
     stereo = stereo_of_opencv(left.camera, right.camera, rotation, shift * square)
-    warnings = list(doubts)
-    if views.square_m is None:
-        warnings.append(
-            f"the square's size is not given; the nominal baseline, itself not measured, makes it {square * 1e3:.1f} mm"
-        )
-    elif nominal.baseline_m is not None and abs(stereo.baseline_m / nominal.baseline_m - 1) > 0.05:
-        warnings.append(
-            f"the baseline comes out as {stereo.baseline_m * 1000:.1f} mm, nominal {nominal.baseline_m * 1000:.1f} mm"
-        )
+    warnings = [
+        *doubts,
+        *conditions_of(free[0], free[1], doubted=bool(doubts)),
+        *_doubts_of_pair(stereo, rms, alone, views.square_m, square, nominal),
+    ]
     if doubts:
         kept = f"the focal length is held at the nominal {nominal.focal_px:.0f} px" if chosen == "held" else ""
-        warnings.append(kept or "the free fit is used all the same: do not trust its focal lengths")
-    epipolar = epipolar_error(stereo, both)
-    scale_from: Literal["board", "baseline"] = "board" if views.square_m is not None else "baseline"
+        offer = "" if held else "; give the lens's (--focal-mm and --pixel-um), and they are held there"
+        warnings.append(kept or f"the free fit is used all the same: do not trust its focal lengths{offer}")
+    used = [pair for pair, error in zip(pairs, together, strict=True) if np.isfinite(error)]
     return StereoFit(
         stereo,
         left,
         right,
         rms,
-        epipolar,
+        epipolar_error(stereo, used),
         (free[0], free[1]),
         None if held is None else (held[0], held[1]),
         chosen,
         square,
-        scale_from,
+        "board" if views.square_m is not None else "baseline",
         tuple(warnings),
+        _listed(views, (left, right), seen, dict(zip(both, together.tolist(), strict=True)), rough),
     )
 
 
-def epipolar_error(stereo: StereoPair, pairs: Sequence[tuple[Array, Array]]) -> float:
-    """Root mean square distance (px of the right image without distortion) of points from their partners' epipolar
-    lines."""
-    t = stereo.translation
-    cross = np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
-    essential = cross @ stereo.rotation
-    off = []
-    for left, right in pairs:
-        lines = stereo.left.rays(left) @ essential.T
-        rays = stereo.right.rays(right)
-        distance = (rays * lines).sum(axis=1) / np.hypot(lines[:, 1], lines[:, 2])
-        off.append(distance * stereo.right.fx)
-    return float(np.sqrt(np.mean(np.square(np.concatenate(off)))))
+def _fitting(views: BoardViews, side: Mapping[int, Array]) -> tuple[CameraFit, set[int]]:
+    """One camera's free fit to its views, by number, and which of them it is not built on: a blurred or half covered
+    board misleads the search for its corners."""
+    bad: set[int] = set()
+    while True:
+        kept = [k for k in side if k not in bad]
+        fit = fit_camera(views.board, [side[k] for k in kept], views.image_size)
+        limit = max(ROUGH_VIEW * float(np.median(fit.view_rms_px)), ROUGH_PX)
+        rough = {k for k, error in zip(kept, fit.view_rms_px, strict=True) if error > limit}
+        if not rough or len(kept) - len(rough) < max(FEWEST_VIEWS, 2 / 3 * len(side)):
+            return fit, bad
+        bad |= rough
 
 
-def _between(
-    board: Array, pairs: Sequence[tuple[Array, Array]], left: Camera, right: Camera
-) -> tuple[float, Array, Array]:
-    """rms px, rotation (3, 3) and translation (3,) in squares from left to right in OpenCV's axes, intrinsics as they
-    are."""
-    first, second = ([np.asarray(p[k], np.float32).reshape(-1, 1, 2) for p in pairs] for k in (0, 1))
-    rms, _, _, _, _, rotation, shift, _, _ = cv2.stereoCalibrate(
-        [np.asarray(board, np.float32)] * len(pairs),
-        first,
-        second,
-        left.matrix,
-        np.array(left.distortion),
-        right.matrix,
-        np.array(right.distortion),
-        (left.width, left.height),
-        flags=cv2.CALIB_FIX_INTRINSIC,
-    )
-    return float(rms), np.asarray(rotation, float), np.asarray(shift, float).reshape(3)
+def _doubts_of_pair(
+    stereo: StereoPair, rms: float, alone: float, given_m: float | None, square_m: float, nominal: Nominal
+) -> list[str]:
+    """Why the motion between the cameras may not be trusted, in plain words."""
+    doubts = []
+    if fits_badly(rms, alone):
+        doubts.append(f"the two cameras do not fit together: {rms:.2f} px, where each alone has {alone:.2f} px")
+    if stereo.translation[1] > 0.5 * stereo.baseline_m:
+        doubts.append("the right camera comes out to the left of the left one: are the pictures swapped?")
+    if given_m is None:
+        doubts.append(
+            "the square's size is not given; the nominal baseline, itself not measured, "
+            f"makes it {square_m * 1e3:.1f} mm"
+        )
+    elif nominal.baseline_m is not None and abs(stereo.baseline_m / nominal.baseline_m - 1) > 0.05:
+        doubts.append(
+            f"the baseline comes out as {stereo.baseline_m * 1000:.1f} mm, nominal {nominal.baseline_m * 1000:.1f} mm"
+        )
+    return doubts
+
+
+def _listed(
+    views: BoardViews,
+    fits: tuple[CameraFit, CameraFit],
+    seen: Sequence[Mapping[int, Array]],
+    together: Mapping[int, float],
+    rough: Sequence[set[int]],
+) -> tuple[View, ...]:
+    """Every view with its errors."""
+    errors = [dict(zip(side, fit.view_rms_px.tolist(), strict=True)) for side, fit in zip(seen, fits, strict=True)]
+    tilts = [dict(zip(side, fit.tilt.tolist(), strict=True)) for side, fit in zip(seen, fits, strict=True)]
+    nan = float("nan")
+    listed = []
+    for k, pair in enumerate(zip(views.left, views.right, strict=True)):
+        why = [f"no board in the {side} picture" for side, corners in zip(EYES, pair, strict=True) if corners is None]
+        why += [
+            f"the corners of the {side} picture do not fit" for side, bad in zip(EYES, rough, strict=True) if k in bad
+        ]
+        if k in together and not np.isfinite(together[k]):
+            why.append("left and right do not belong together")
+        tilt = tilts[0].get(k, tilts[1].get(k, nan))
+        listed.append(
+            View(
+                views.name(k), errors[0].get(k, nan), errors[1].get(k, nan), together.get(k, nan), tilt, ", ".join(why)
+            )
+        )
+    return tuple(listed)
 
 
 def _coverage(corners: Array, image_size: tuple[int, int]) -> NDArray[np.int64]:

@@ -27,15 +27,19 @@ def doubts_of(left: CameraFit, right: CameraFit, nominal: Nominal) -> list[str]:
             doubts.append(f"the {name} focal length comes out as {focal:.0f} px, nominal {nominal.focal_px:.0f} px")
     if abs(np.log(left.camera.fx / right.camera.fx)) > NOMINAL_TOLERANCE:
         doubts.append(f"the two focal lengths differ: {left.camera.fx:.0f} and {right.camera.fx:.0f} px")
-    if not doubts:
-        return []
-    tilt = float(np.degrees(max(left.tilt.max(), right.tilt.max())))
-    if np.deg2rad(tilt) < WANTED_TILT:
-        doubts.append(f"the board was tilted by {tilt:.1f}° at most: tilt it by 15 to 45° about both axes")
+    return doubts
+
+
+def conditions_of(left: CameraFit, right: CameraFit, *, doubted: bool) -> list[str]:
+    """What the views lack, in plain words; doubted: the focal lengths are, so that a lack of tilt is named too."""
+    lacks = []
+    tilt = float(max(left.tilt.max(), right.tilt.max()))
+    if doubted and tilt < WANTED_TILT:
+        lacks.append(f"the board was tilted by {np.degrees(tilt):.1f}° at most: tilt it by 15 to 45° about both axes")
     views = min(len(left.tilt), len(right.tilt))
     if views < WANTED_VIEWS:
-        doubts.append(f"there are only {views} views: take {WANTED_VIEWS} to 30")
+        lacks.append(f"there are only {views} views: take {WANTED_VIEWS} to 30")
     share = min(float((fit.coverage > 0).mean()) for fit in (left, right))
     if share < WANTED_COVERAGE:
-        doubts.append(f"the corners cover {share:.0%} of the image only: bring the board into every corner of it")
-    return doubts
+        lacks.append(f"the corners cover {share:.0%} of the image only: bring the board into every corner of it")
+    return lacks

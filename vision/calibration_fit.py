@@ -14,6 +14,10 @@ Array = NDArray[np.float64]
 CELLS = (8, 6)  # into which an image is divided, across and down, to see where corners were
 
 
+class CalibrationError(ValueError):
+    """The data cannot be calibrated from at all; one line for a person."""
+
+
 @dataclass(frozen=True)
 class Nominal:
     """What the data sheets say: focal length in pixels and distance of the lenses in metres, None where unknown."""
@@ -38,3 +42,17 @@ class CameraFit:
     focal_sigma_px: float
     tilt: Array
     coverage: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class View:
+    """How one view fits: reprojection error in px of the left and the right camera, and of both held together; NaN
+    where the view did not count. tilt: angle in radians between the board's normal and an optical axis. left_out: why
+    it did not count, empty where it did."""
+
+    name: str
+    left_px: float = float("nan")
+    right_px: float = float("nan")
+    together_px: float = float("nan")
+    tilt: float = float("nan")
+    left_out: str = ""

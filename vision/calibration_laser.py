@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from vision.calibration import CalibrationError
+from vision.calibration_fit import CalibrationError
 from vision.camera import LaserGrid, StereoPair
 from vision.capture import rotation_of
 

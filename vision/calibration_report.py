@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +15,9 @@ from vision.calibration_laser import LaserFit
 MARGIN, SCALE_PX = 24, 480
 
 
-def stereo_text(fit: StereoFit) -> str:
-    """The report, a line per fact; warnings come last and are marked."""
+def stereo_text(fit: StereoFit, unused: Sequence[str] = ()) -> str:
+    """The report, a line per fact, and one per view; warnings come last and are marked. unused: pictures that could not
+    be views at all, and why."""
     angles = np.degrees(_angles(fit.stereo.rotation))
     lines = [
         f"fit            {fit.chosen}" + (" at the nominal focal length" if fit.chosen == "held" else ""),
@@ -29,6 +32,13 @@ def stereo_text(fit: StereoFit) -> str:
         if camera.held:
             found, sigma = free.camera.fx, free.focal_sigma_px
             lines.append(f"  fitted freely  focal length {found:.1f} ± {sigma:.1f} px, {free.rms_px:.3f} px")
+    wide = max(len("view"), *(len(view.name) for view in fit.views))
+    lines += ["", f"{'view':{wide}}    left   right  together   tilt   (px, degrees)"]
+    for view in fit.views:
+        errors = f"{_number(view.left_px, 6)}  {_number(view.right_px, 6)}    {_number(view.together_px, 6)}"
+        tilt = f"{_number(float(np.degrees(view.tilt)), 5, 1)}"
+        lines.append(f"{view.name:{wide}}  {errors}  {tilt}   {view.left_out}".rstrip())
+    lines += [f"left out: {what}" for what in unused]
     if fit.warnings:
         lines += ["", *[f"warning: {warning}" for warning in fit.warnings]]
     return "\n".join(lines) + "\n"
@@ -70,8 +80,9 @@ def _camera_lines(name: str, fit: CameraFit) -> list[str]:
         f"  focal length   {camera.fx:.1f}, {camera.fy:.1f}{sigma} px",
         f"  centre         {camera.cx:.1f}, {camera.cy:.1f} px",
         f"  distortion     {_row(np.array(camera.distortion), 5)}",
-        f"  reprojection   {fit.rms_px:.3f} px; by view {_row(fit.view_rms_px, 2)}",
-        f"  views          {len(fit.tilt)}, tilted by {_row(np.degrees(fit.tilt), 1)} degrees",
+        f"  reprojection   {fit.rms_px:.3f} px, at most {fit.view_rms_px.max():.3f} px a view",
+        f"  views          {len(fit.tilt)}, tilted by {np.degrees(fit.tilt.min()):.1f} to "
+        f"{np.degrees(fit.tilt.max()):.1f} degrees",
         f"  coverage       {(fit.coverage > 0).mean():.0%} of {CELLS[0]} x {CELLS[1]} cells",
     ]
 
@@ -96,6 +107,10 @@ def _coverage(fit: CameraFit) -> NDArray[np.uint8]:
     cv2.rectangle(picture, (0, 0), (size[0] - 1, size[1] - 1), edge, 1)
     framed = cv2.copyMakeBorder(picture, MARGIN, MARGIN, MARGIN, MARGIN, cv2.BORDER_CONSTANT, value=(255, 255, 255))
     return np.asarray(framed, np.uint8)
+
+
+def _number(value: float, width: int, digits: int = 3) -> str:
+    return f"{value:{width}.{digits}f}" if np.isfinite(value) else f"{'-':>{width}}"
 
 
 def _angles(rotation: NDArray[np.float64]) -> NDArray[np.float64]:

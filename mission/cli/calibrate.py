@@ -65,7 +65,7 @@ def calibrate(
       mission calibrate walls/ --laser --camchain rig/camchain.yaml
     """
     from mission.cli.errors import CommandError
-    from vision.calibration import CalibrationError
+    from vision.calibration_fit import CalibrationError
     from vision.camchain import CamchainError
 
     try:
@@ -90,23 +90,27 @@ def _stereo(
 ) -> None:
     from dataclasses import replace
 
+    import cv2
+
     from devices.camchain_file import write_camchain
     from mission.cli.calibration_files import DataSheet, find_boards, nominal_of, read_corners
     from vision.calibration import calibrate_stereo
     from vision.calibration_report import coverage_picture, stereo_text
 
+    cv2.setNumThreads(1)  # or ill-conditioned sums end differently from run to run
+    unused: list[str] = []
+    given = DataSheet()
     if source.is_dir():
-        views, given = find_boards(source, board), DataSheet()
+        views, unused = find_boards(source, board)
     else:
         views, given = read_corners(source)
     if square_mm is not None:
         views = replace(views, square_m=square_mm / 1000)
     found = calibrate_stereo(views, nominal_of(given, *sheet), fit.value)
-    text = stereo_text(found)
+    text = stereo_text(found, unused)
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_camchain(out, found.stereo)
     if report is not None:
-        import cv2
-
         from mission.cli.calibration_page import page
 
         report.mkdir(parents=True, exist_ok=True)

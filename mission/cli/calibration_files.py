@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mission.cli.errors import CommandError
@@ -81,30 +83,47 @@ def read_corners(path: Path) -> tuple[BoardViews, DataSheet]:
     return BoardViews(file.image_size, np.array(file.object_points), sides[0], sides[1], square), file.nominal
 
 
-def find_boards(folder: Path, board: str) -> BoardViews:
-    """Corners of a board (`9x6`: inner corners across and down) in a folder's pictures: left/NAME and right/NAME, or
-    left_NAME and right_NAME."""
-    from vision.board import BoardViews, board_points, find_corners
+def find_boards(folder: Path, board: str) -> tuple[BoardViews, list[str]]:
+    """Corners of a board (`9x6`: inner corners across and down) in a folder's pictures, left/NAME and right/NAME, or
+    left_NAME and right_NAME; and of the pictures that cannot be used, which and why."""
+    from vision.board import BoardViews, board_points, find_corners, turned_alike
 
     columns, rows = _board_size(board)
-    sides: dict[str, list[Any]] = {"left": [], "right": []}
-    size: tuple[int, int] | None = None
-    pairs = _pairs(folder)
-    for pair in pairs:
-        for side, path in zip(sides, pair, strict=True):
-            image = read_image(path)
-            here = (image.shape[1], image.shape[0])
-            if size is not None and here != size:
-                raise CommandError(f"{path}: {here[0]} x {here[1]} px, the others are {size[0]} x {size[1]}")
-            size = here
-            sides[side].append(find_corners(image, columns, rows))
-    seen = {side: sum(corners is not None for corners in found) for side, found in sides.items()}
-    if min(seen.values()) == 0 or size is None:
+    pairs, unused = _pairs(folder)
+    looked: dict[str, list[tuple[tuple[int, ...], NDArray[np.float64] | None]]] = {}
+    for name, paths in pairs.items():
+        try:
+            images = [read_image(path) for path in paths]
+        except CommandError as error:
+            unused.append(str(error))
+            continue
+        looked[name] = [(image.shape[1::-1], find_corners(image, columns, rows)) for image in images]
+    sizes = Counter(size for pair in looked.values() for size, _ in pair)
+    if not sizes:
+        raise CommandError(f"{folder}: no pair of pictures that can be read: {unused[0]}")
+    size, count = sizes.most_common(1)[0]
+    if 2 * len(looked) - count > len(looked) // 3:
+        raise CommandError(
+            f"{folder}: pictures of {' and '.join(f'{w} x {h}' for w, h in sorted(sizes))} px; "
+            "give those of both cameras as they took them, of one size"
+        )
+    names, left, right = [], [], []
+    for name, ((one_size, one), (other_size, other)) in looked.items():
+        odd = one_size if one_size != size else other_size
+        if odd != size:
+            unused.append(f"{name}: {odd[0]} x {odd[1]} px, the others are {size[0]} x {size[1]}")
+            continue
+        names.append(name)
+        left.append(one)
+        right.append(other if one is None or other is None else turned_alike(one, other, columns, rows))
+    seen = [sum(corners is not None for corners in side) for side in (left, right)]
+    if min(seen) == 0:
         raise CommandError(
             f"{folder}: no board of {columns} x {rows} inner corners found "
-            f"({seen['left']} of {len(pairs)} left, {seen['right']} right pictures); is --board right?"
+            f"({seen[0]} of {len(names)} left, {seen[1]} right pictures); is --board right?"
         )
-    return BoardViews(size, board_points(columns, rows), tuple(sides["left"]), tuple(sides["right"]))
+    views = BoardViews((size[0], size[1]), board_points(columns, rows), tuple(left), tuple(right), None, tuple(names))
+    return views, unused
 
 
 def read_walls(source: Path, laser: LaserGrid) -> list[WallDots]:
@@ -146,8 +165,8 @@ def _board_size(text: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[1])
 
 
-def _pairs(folder: Path) -> list[tuple[Path, Path]]:
-    """Left and right pictures of the same name, sorted."""
+def _pairs(folder: Path) -> tuple[dict[str, tuple[Path, Path]], list[str]]:
+    """Left and right pictures by the name that they share, and what is said of those without a partner."""
     if not folder.is_dir():
         raise CommandError(f"{folder}: neither a folder of pictures nor a .json file of corners")
     found: dict[str, dict[str, Path]] = {"left": {}, "right": {}}
@@ -158,11 +177,18 @@ def _pairs(folder: Path) -> list[tuple[Path, Path]]:
             if path.parent.name == side:
                 names[path.stem] = path
             elif path.stem.startswith(side):
-                names[path.stem[len(side) :]] = path
-    both = sorted(set(found["left"]) & set(found["right"]))
+                names[path.stem[len(side) :].lstrip("_-")] = path
+    left, right = found.values()
+    both = sorted(set(left) & set(right))
     if not both:
         raise CommandError(f"{folder}: no pairs of pictures: left/NAME and right/NAME, or left_NAME and right_NAME")
-    return [(found["left"][name], found["right"][name]) for name in both]
+    alone = [
+        f"{path}: no {other} picture of that name"
+        for names, partners, other in ((left, right, "right"), (right, left, "left"))
+        for name, path in names.items()
+        if name not in partners
+    ]
+    return {name: (left[name], right[name]) for name in both}, alone
 
 
 def _seen_walls(folder: Path, laser: LaserGrid) -> list[WallDots]:

@@ -48,6 +48,7 @@ def read_image(path: Path) -> Image:
         raise CommandError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     if data is None:
         raise CommandError(f"{path}: {size >> 20} MB is too large for an image; give one frame of a camera")
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what it says of a broken file is said below
     try:
         flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
         image = cv2.imdecode(data, flags) if len(data) else None

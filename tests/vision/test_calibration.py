@@ -4,16 +4,18 @@ called so."""
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from vision.board import BoardViews, board_points, find_corners
-from vision.calibration import CalibrationError, calibrate_stereo, epipolar_error, fit_camera
-from vision.calibration_fit import Nominal
+from vision.board import BoardViews, board_points, find_corners, turned_alike
+from vision.calibration import calibrate_stereo, fit_camera
+from vision.calibration_fit import CalibrationError, Nominal
 from vision.calibration_laser import WallDots, fit_laser, triangulated
+from vision.calibration_pairs import epipolar_error
 from vision.camera import Camera, LaserGrid, StereoPair
 from vision.capture import rotation_of
 
@@ -101,6 +103,59 @@ def test_real_badly_conditioned_corners_are_held_by_the_nominal_lens() -> None:
     assert fit.stereo.baseline_m == pytest.approx(0.05)
     assert fit.scale_from == "baseline"
     assert abs(fit.stereo.translation[1]) > 0.9 * 0.05  # side by side
+
+
+def test_a_pair_that_was_not_taken_at_one_time_is_left_out_and_named() -> None:
+    views = board_views(35, 12, np.random.default_rng(1))
+    moved = replace(views, right=(views.right[1], *views.right[1:]), names=tuple("abcdefghijkl"))
+    fit = calibrate_stereo(moved)
+    assert [view.name for view in fit.views if view.left_out] == ["a"]
+    assert "do not belong together" in fit.views[0].left_out
+    assert np.allclose(fit.stereo.translation, STEREO.translation, atol=2e-3)
+    assert fit.rms_px < 0.3 and fit.epipolar_px < 0.3
+
+
+def test_a_view_with_misled_corners_is_left_out_of_its_camera() -> None:
+    rng = np.random.default_rng(6)
+    views = board_views(35, 12, rng)
+    blurred = views.left[4] + rng.normal(0, 4, (54, 2))
+    fit = calibrate_stereo(replace(views, left=(*views.left[:4], blurred, *views.left[5:])))
+    assert [view.name for view in fit.views if view.left_out] == ["view 5"]
+    assert "left picture" in fit.views[4].left_out and np.isnan(fit.views[4].left_px) and fit.views[4].right_px < 0.3
+    assert fit.stereo.left.fx == pytest.approx(LEFT.fx, rel=2e-3)
+
+
+def test_cameras_that_never_looked_at_the_same_board_are_refused() -> None:
+    views = board_views(35, 12, np.random.default_rng(1))
+    with pytest.raises(CalibrationError, match="do not fit together"):
+        calibrate_stereo(replace(views, right=views.right[3:] + views.right[:3]))
+
+
+def test_swapped_cameras_are_noticed() -> None:
+    views = board_views(35, 12, np.random.default_rng(1))
+    fit = calibrate_stereo(replace(views, left=views.right, right=views.left))
+    assert "swapped" in " ".join(fit.warnings)
+
+
+def test_few_views_are_warned_of_though_they_tilt_and_a_lens_is_asked_for_where_it_would_help() -> None:
+    few = calibrate_stereo(board_views(35, 5, np.random.default_rng(8), 0.05))
+    assert few.chosen == "free" and "only 5 views" in " ".join(few.warnings)
+    flat = calibrate_stereo(board_views(2, 8, np.random.default_rng(2), 0.3))
+    assert "--focal-mm" in flat.warnings[-1]
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(8, 6), (7, 5), (6, 6)])
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+def test_both_eyes_count_a_board_that_looks_alike_upside_down_from_one_corner(
+    columns: int, rows: int, quarters: int
+) -> None:
+    if columns != rows and quarters % 2:
+        return  # such a turn exchanges rows and columns, which a search for so many of them does not
+    corners = board_points(columns, rows)[:, :2] * 40 + 200
+    turn = np.array([[0.1, -0.995], [0.995, 0.1]])  # a board held on its side
+    left, right = corners @ turn.T, corners @ turn.T * 0.97 + np.array([-70.0, 9.0])
+    counted = np.rot90(right.reshape(rows, columns, 2), quarters).reshape(-1, 2)
+    assert np.allclose(turned_alike(left, counted, columns, rows), right)
 
 
 def test_epipolar_error_is_that_of_the_points() -> None:

@@ -100,28 +100,51 @@ def test_a_laser_is_calibrated_from_dots_on_walls(tmp_path: Path, capsys: pytest
     assert "outside a grid of 3 rows" in err
 
 
-def test_pictures_of_a_board_are_searched_in_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("rows", [5, 6])
+def test_pictures_of_a_board_are_searched_in_pairs(
+    rows: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A board of 8 x 6 corners looks the same upside down, and is held so in some pictures."""
     rng = np.random.default_rng(4)
-    squares = np.kron(np.indices((6, 9)).sum(0) % 2, np.ones((60, 60))).astype(np.uint8) * 200 + 30
+    squares = np.kron(np.indices((rows + 1, 9)).sum(0) % 2, np.ones((60, 60))).astype(np.uint8) * 200 + 30
     board = cv2.copyMakeBorder(squares, 60, 60, 60, 60, cv2.BORDER_CONSTANT, value=230)
     half = np.array([board.shape[1], board.shape[0]]) / 2
     size_m = 0.05
-    for k in range(3):
-        turn = rotation_of(0.05, *np.deg2rad(rng.uniform(-30, 30, 2)))
+    for k, roll in enumerate((0.05, 1.5, 2.0, 3.1, -1.6)):
+        turn = rotation_of(roll, *np.deg2rad(rng.uniform(-30, 30, 2)))
         outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
         flat = np.column_stack([np.zeros(4), outline / 60 * size_m])
-        points = flat @ turn.T + np.array([0.9, 0.1, 0.0])
+        points = flat @ turn.T + np.array([1.0, 0.1, 0.0])
         for side, shift in (("left", 0.0), ("right", -0.2)):
             seen = (points + np.array([0, shift, 0])) @ np.eye(3)
             uv = 500 * seen[:, 1:] / seen[:, :1] + np.array([249.5, 199.5])
             warp = cv2.getPerspectiveTransform((outline + half).astype(np.float32), uv.astype(np.float32))
             image = cv2.warpPerspective(board, warp, (500, 400), borderValue=230)
             cv2.imwrite(str(tmp_path / f"{side}_{k}.png"), image)
-    arguments = ("--board", "8x5", "--square-mm", 50, "--out", tmp_path / "chain.yaml", "--fit", "free")
+    arguments = ("--board", f"8x{rows}", "--square-mm", 50, "--out", tmp_path / "new" / "chain.yaml", "--fit", "free")
     code, out, err = run(capsys, tmp_path, *arguments)
     assert code == 0, err
-    assert read_camchain(tmp_path / "chain.yaml").baseline_m == pytest.approx(0.2, rel=0.05)
-    assert "views          3" in out
+    assert read_camchain(tmp_path / "new" / "chain.yaml").baseline_m == pytest.approx(0.2, rel=0.03)
+    assert "views          5" in out
+
+
+def test_pictures_that_cannot_be_used_are_named_and_the_others_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    test_pictures_of_a_board_are_searched_in_pairs(5, tmp_path, capsys)
+    cv2.imwrite(str(tmp_path / "left_alone.png"), np.full((400, 500), 200, np.uint8))
+    for side in ("left", "right"):
+        cv2.imwrite(str(tmp_path / f"{side}_wall.png"), np.full((400, 500), 128, np.uint8))
+        cv2.imwrite(str(tmp_path / f"{side}_small.png"), np.full((100, 100), 128, np.uint8))
+        (tmp_path / f"{side}_broken.png").write_bytes((tmp_path / "left_0.png").read_bytes()[:2000])
+    (tmp_path / "left_small.png").write_bytes((tmp_path / "left_1.png").read_bytes())
+    arguments = ("--board", "8x5", "--square-mm", 50, "--out", tmp_path / "chain.yaml")
+    code, out, err = run(capsys, tmp_path, *arguments)
+    assert (code, err) == (0, "")
+    assert re.search(r"^wall +- .*no board in the left picture, no board in the right picture$", out, re.M)
+    for words in ("left_alone.png: no right picture", "left_broken.png: not an image", "small: 100 x 100 px, the"):
+        assert re.search(f"^left out: .*{words}", out, re.M), out
+    assert "views          5" in out and "warning: there are only 5 views" in out
 
 
 def test_pictures_without_the_board_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
