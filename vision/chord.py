@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import atan2, copysign, cos, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -48,24 +49,26 @@ def heading(edges: tuple[Candidate, ...], axis: float, camera: Camera, surface: 
     It is what the axis shows midway between two edges at the station nearest to `near` (2,), image frame, and with
     one edge what it would show in the image centre.
     """
-    along = np.array([np.cos(axis), np.sin(axis)])
-    across = np.array([-along[1], along[0]])
-    station = float(near @ along)
-    mean, middle = np.zeros(3), np.zeros(2)
+    x, y = cos(axis), sin(axis)
+    u, v = near.tolist()
+    station = u * x + v * y
+    points, feet = [], []
     for edge in edges:
-        direction = edge.profile.direction[edge.index]
-        offset = (edge.rho - station * float(edge.outward @ along)) / float(edge.outward @ across)
-        foot = station * along + offset * across
-        rays = camera.rays(foot + np.array([[-60.0], [60.0]]) * direction + camera.centre)
-        inverse = (1 - rays[:, 1:] @ surface.slope) / surface.depth_m
-        if (inverse <= 0).any():
-            return axis
-        ends = rays / inverse[:, None]
-        run = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-        mean += run if run[1:] @ along > 0 else -run
-        middle += foot / len(edges)
-    if len(edges) == 1:
-        middle = np.zeros(2)
-    ray = camera.rays((middle + camera.centre)[None])[0]
-    shown = mean[1:] - ray[1:] * mean[0]
-    return float(np.arctan2(shown[1], shown[0]) % np.pi)
+        (out_x, out_y), (way_x, way_y) = edge.outward.tolist(), edge.profile.direction[edge.index].tolist()
+        offset = (edge.rho - station * (out_x * x + out_y * y)) / (out_y * x - out_x * y)
+        foot_u, foot_v = station * x - offset * y, station * y + offset * x
+        points += [(foot_u - 60.0 * way_x, foot_v - 60.0 * way_y), (foot_u + 60.0 * way_x, foot_v + 60.0 * way_y)]
+        feet.append((foot_u, foot_v))
+    points.append((sum(f[0] for f in feet) / 2, sum(f[1] for f in feet) / 2) if len(feet) == 2 else (0.0, 0.0))
+    rays = camera.rays(np.array(points) + camera.centre)
+    inverse = (1 - rays[:-1, 1:] @ surface.slope) / surface.depth_m
+    if not inverse.min() > 0:
+        return axis
+    ends = (rays[:-1] / inverse[:, None]).tolist()
+    ahead, right, down = 0.0, 0.0, 0.0
+    for one, two in zip(ends[::2], ends[1::2], strict=True):
+        a, b, c = two[0] - one[0], two[1] - one[1], two[2] - one[2]
+        length = copysign(sqrt(a * a + b * b + c * c), b * x + c * y)
+        ahead, right, down = ahead + a / length, right + b / length, down + c / length
+    _, ray_right, ray_down = rays[-1].tolist()
+    return atan2(down - ray_down * ahead, right - ray_right * ahead) % pi

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from vision.beside_kernels import outermost, shares_agreeing, stretches_beside
 from vision.camera import Camera, StereoPair
 from vision.capture import Image
-from vision.evidence_kernels import line_of_most, longest_runs, median_steps, missing_dots, runs_about
+from vision.evidence_kernels import (
+    lines_before,
+    longest_runs,
+    median_steps,
+    missing_dots,
+    runs_about,
+    shares_above,
+)
 from vision.lane_kernels import shares_at_depth, steps_before, steps_between
 from vision.lines import Profiles
 from vision.surface import Surface
@@ -21,6 +28,8 @@ from vision.surface_kernels import median
 Array = NDArray[Any]  # of floats
 
 FIRST_INWARD, INWARD_STEP, INWARD_SAMPLES, INWARD_PLACES = 5.0, 3.0, 56, 24
+MOST_ALONG, STEEPEST = 0.3, 0.5  # share of the places with a step before a line that make it one, and its slope at most
+INWARD_SHARES = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES  # where those places lie along a stretch
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
 ROUND_M = 1.0  # how far behind the surface before the camera a thick blade's edge may lie
 PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
@@ -151,7 +160,7 @@ def blocked(
     the blade's texture, lies between the outermost dots and the line."""
     change, _ = _steps_before(profile, blade, smooth, low, high)
     threshold = np.maximum(np.maximum(0.7 * step, 1.7 * blade.texture), 3.0 * noise)
-    return np.asarray((change.max(axis=2) > threshold[:, None]).mean(axis=1), float)
+    return np.asarray(shares_above(change, threshold))
 
 
 def nearer_lines(
@@ -161,30 +170,18 @@ def nearer_lines(
     the lines: what is nearest to the dots hides what is behind."""
     change, places = _steps_before(profile, blade, smooth, low, high)
     threshold = np.maximum(np.maximum(0.5 * step, 1.7 * blade.texture), 3.0 * noise)
-    strong = change > threshold[:, None, None]
-    normals, rhos = [], []
-    for k in np.flatnonzero(strong.any(axis=2).mean(axis=1) > 0.3).tolist():
-        seen = strong[k].any(axis=1)
-        # The samples run inward: the last strong one is the first that one meets outward; its peak is near by.
-        last = strong.shape[2] - 1 - strong[k, seen, ::-1].argmax(axis=1)
-        near = np.clip(last[:, None] - np.arange(3), 0, strong.shape[2] - 1)
-        peak = near[np.arange(len(last)), np.take_along_axis(change[k, seen], near, 1).argmax(axis=1)]
-        t, depth = places[k, seen], -(FIRST_INWARD + INWARD_STEP * (peak + 1))
-        slope, shift, agree = line_of_most(t, depth, 0.25 * float(np.ptp(places[k])), INWARD_STEP)
-        if agree < 0.3 * INWARD_PLACES or abs(slope) > 0.5:
-            continue
-        turn = float(np.arctan(slope))
-        normal = profile.normal[k] * np.cos(turn) - profile.direction[k] * np.sin(turn)
-        normals.append(normal)
-        rhos.append(float(normal @ profile.normal[k]) * (float(profile.rho[k]) + shift))
-    return np.array(normals).reshape(-1, 2), np.array(rhos)
+    slope, shift = np.empty((2, len(low)))
+    lines_before(change, places, threshold, FIRST_INWARD, INWARD_STEP, MOST_ALONG, STEEPEST, slope, shift)
+    which = np.flatnonzero(np.isfinite(slope))
+    size = np.hypot(1.0, slope[which])
+    normal = (profile.normal[which] - profile.direction[which] * slope[which, None]) / size[:, None]
+    return normal, (profile.rho[which] + shift[which]) / size
 
 
 def _steps_before(profile: Profiles, blade: Blade, smooth: Image, low: Array, high: Array) -> tuple[Array, Array]:
     """Steps (k, places, samples) in grey levels at samples inward of each line, zero farther in than its outermost
     dots, and the places (k, places) along it."""
-    share = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES
-    places = low[:, None] + (high - low)[:, None] * share
+    places = low[:, None] + (high - low)[:, None] * INWARD_SHARES
     last = len(blade.dots) - 1
     across = outermost(blade.dots, profile.normal, last - round(0.85 * last))
     change = np.empty((len(low), INWARD_PLACES, INWARD_SAMPLES - 2))

@@ -155,3 +155,55 @@ def line_of_most(places: Floats, depths: Floats, least_apart: float, within: flo
             if agree - 0.1 * apart / count > best:
                 best, slope, shift, most = agree - 0.1 * apart / count, tried, at_zero, agree
     return slope, shift, most
+
+
+@compiled
+def shares_above(change: Floats, thresholds: Floats) -> Floats:
+    """Share (k,) of the places of each of k lines at which some sample of change (k, m, n) exceeds a threshold (k,)."""
+    lines, places, samples = change.shape
+    share = np.empty(lines)
+    for line in range(lines):
+        count = 0
+        for m in range(places):
+            most = -np.inf
+            for i in range(samples):
+                most = max(most, change[line, m, i])
+            count += most > thresholds[line]
+        share[line] = count / places
+    return share
+
+
+@compiled
+def lines_before(
+    change: Floats, places: Floats, thresholds: Floats, first_px: float, step_px: float, share: float, steepest: float,
+    turns: Floats, shifts: Floats,
+) -> None:  # fmt: skip
+    """The line through the first steps that one meets before each of k lines, coming from the dots, where at least a
+    share of the places has one and lies on it.
+
+    change (k, m, n): steps at samples from first_px before the line on, step_px apart, at places (k, m) along it; those
+    above a threshold (k,) count. Written: turns and shifts (k,), slope and offset against the line; NaN without one."""
+    lines, count, samples = change.shape
+    at, depth = np.empty(count), np.empty(count)
+    for line in range(lines):
+        turns[line] = shifts[line] = np.nan
+        seen, low, high = 0, np.inf, -np.inf
+        for m in range(count):
+            low, high = min(low, places[line, m]), max(high, places[line, m])
+            # The samples run inward: the last strong one is the first that one meets outward; its peak is near by.
+            last = samples - 1
+            while last >= 0 and not change[line, m, last] > thresholds[line]:
+                last -= 1
+            if last < 0:
+                continue
+            peak = last
+            for i in (max(last - 1, 0), max(last - 2, 0)):
+                if change[line, m, i] > change[line, m, peak]:
+                    peak = i
+            at[seen], depth[seen] = places[line, m], -(first_px + step_px * (peak + 1))
+            seen += 1
+        if not seen / count > share:
+            continue
+        slope, shift, agree = line_of_most(at[:seen], depth[:seen], 0.25 * (high - low), step_px)
+        if agree >= share * count and abs(slope) <= steepest:
+            turns[line], shifts[line] = slope, shift

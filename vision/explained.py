@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.camera import LaserGrid, StereoPair
+from vision.camera import Camera, LaserGrid, StereoPair
+from vision.compiled import compiled
 from vision.dots import Spots
 from vision.grid import Matches, expected_points, grid_coordinates
 from vision.observation import Dots
@@ -17,6 +18,7 @@ from vision.surface import Surface
 from vision.surface_kernels import median
 
 Array = NDArray[Any]  # of floats
+Flags = NDArray[np.bool_]
 
 LEAST_LEVEL = 0.4  # of the matched dots' level: a fainter spot that no other eye confirms is none
 OFF_GRID = 0.08  # of the grid's spacing, for a spot that only one eye has read
@@ -64,29 +66,49 @@ def absent_dots(
     seen = matches.take(matches.surface == blade.surface[0])  # also where it curves away from the fitted surface
     free[seen.row * laser.columns + seen.column] = False
     points = points[free]
-    inside = np.ones(len(points), bool)
-    pixels = []
-    for camera, spots, known, there in (
-        (stereo.left, left, matches.left, points),
-        (stereo.right, right, matches.right, points @ stereo.rotation.T + stereo.translation),
-    ):
-        uv = camera.project(there)
-        pixels.append(uv)
-        if spots is None:
+    pixels = stereo.left.project(points)
+    open_ = np.ones(len(points), np.bool_)
+    _leave_room(pixels, _size(stereo.left), left.uv, matches.left, BORDER_PX, open_)
+    if right is not None:
+        there = stereo.right.project(points @ stereo.rotation.T + stereo.translation)
+        _leave_room(there, _size(stereo.right), right.uv, matches.right, BORDER_PX, open_)
+    hull = cv2.convexHull(left.uv[blade.left].astype(np.float32))[:, 0]
+    _leave_outside(pixels, hull, open_)
+    return np.asarray(pixels[open_] - stereo.left.centre, float)
+
+
+def _size(camera: Camera) -> tuple[int, int]:
+    return camera.width, camera.height
+
+
+@compiled
+def _leave_room(
+    pixels: Array, size: tuple[int, int], spots: Array, known: NDArray[np.int64], room_px: float, open_: Flags
+) -> None:
+    """Of open_ (m,), let none stand whose pixel (m, 2) lies nearer than so many to the border of an image of this size
+    or to one of the spots (n, 2) that are not among the known (k,)."""
+    unread = np.ones(len(spots), np.bool_)
+    for k in known:
+        unread[k] = False
+    width, height = size
+    for m in range(len(pixels)):
+        u, v = pixels[m, 0], pixels[m, 1]
+        if not (room_px < u < width - 1 - room_px and room_px < v < height - 1 - room_px):
+            open_[m] = False
             continue
-        size = (camera.width - 1 - BORDER_PX, camera.height - 1 - BORDER_PX)
-        inside &= (uv > BORDER_PX).all(axis=1) & (uv < size).all(axis=1)
-        unread = np.delete(spots.uv, known, axis=0)
-        if len(unread):
-            inside &= np.hypot(*(uv[:, None] - unread).transpose(2, 0, 1)).min(axis=1) > BORDER_PX
-    outside = pixels[0][inside]
-    outside = outside[~_enclosed(outside, left.uv[blade.left])]
-    return np.asarray(outside - stereo.left.centre, float)
+        for n in range(len(spots)):
+            if unread[n] and (u - spots[n, 0]) ** 2 + (v - spots[n, 1]) ** 2 <= room_px**2:
+                open_[m] = False
 
 
-def _enclosed(points: Array, dots: Array) -> NDArray[np.bool_]:
-    """Which of the points (m, 2) lie inside the convex hull of dots (n, 2)."""
-    hull = cv2.convexHull(dots.astype(np.float32))[:, 0]
-    sides = np.roll(hull, -1, axis=0) - hull
-    turns = sides[:, 0] * (points[:, None, 1] - hull[:, 1]) - sides[:, 1] * (points[:, None, 0] - hull[:, 0])
-    return np.asarray((turns > 0).all(axis=1) | (turns < 0).all(axis=1))
+@compiled
+def _leave_outside(points: Array, hull: Array, open_: Flags) -> None:
+    """Of open_ (m,), let none stand whose point (m, 2) lies inside a convex hull (k, 2)."""
+    for m in range(len(points)):
+        left, right = True, True
+        for k in range(len(hull)):
+            after = (k + 1) % len(hull)
+            side_u, side_v = hull[after, 0] - hull[k, 0], hull[after, 1] - hull[k, 1]
+            turn = side_u * (points[m, 1] - hull[k, 1]) - side_v * (points[m, 0] - hull[k, 0])
+            left, right = left and turn > 0, right and turn < 0
+        open_[m] = open_[m] and not (left or right)

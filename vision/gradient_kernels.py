@@ -9,17 +9,13 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 from vision.compiled import compiled
+from vision.flags import GATHER, NUMBER, SET
 
 Floats = NDArray[Any]
 Integers = NDArray[Any]
 
 SUM = 36  # what a gradient is written as, in grey levels per px of the half-size image
 LEVEL, LEVELS = 9, 5441  # strengths that are counted as one, and how many such there are
-GATHER = np.uint64(0x0102040810204080)  # brings the lowest bits of eight bytes together in the highest byte
-NUMBER = np.array([bin(byte).count("1") for byte in range(256)])  # of set bits in a byte
-SET = np.zeros((256, 8), np.uint8)  # and which these are, the first ones first
-for _byte in range(256):
-    SET[_byte, : NUMBER[_byte]] = [bit for bit in range(8) if _byte >> bit & 1]
 
 
 @compiled

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 from vision.compiled import compiled
+from vision.flags import GATHER, NUMBER, SET
 
 Array = NDArray[Any]  # of floats
 
@@ -122,41 +123,57 @@ def _follow(off: Image, on: Image, shift: Array, steps: int, rows: int) -> None:
     margin = int(max(abs(shift[0]), abs(shift[1]))) + 6
     if 3 * margin > height or 3 * margin > width:
         return
-    places = np.empty((((height - 2 * margin) // rows + 1) * (width - 2 * margin) + 1, 2), np.int32)
-    slopes = np.empty((len(places), 2), np.float32)
-    count = 0
-    steep, inner = np.empty(width, np.uint8), width - 2 * margin
+    # where `on` is steep: how far its pixels are from the first one, and its slopes
+    places = np.empty(((height - 2 * margin) // rows + 1) * (width - 2 * margin) + 8, np.int32)
+    count, inner = 0, width - 2 * margin
+    steep = np.zeros((inner + 7) // 8 * 8, np.uint8)
+    eights = steep.view(np.uint64)
     for v in range(margin, height - margin, rows):
         above, below = on[v - 1, margin:], on[v + 1, margin:]
         before, after = on[v, margin - 1 :], on[v, margin + 1 :]
         for i in range(inner):
             gu, gv = np.int32(after[i]) - np.int32(before[i]), np.int32(below[i]) - np.int32(above[i])
             steep[i] = gu * gu + gv * gv >= STEEP * STEEP
-        for i in range(inner):
-            places[count, 0], places[count, 1] = v, margin + i
-            slopes[count, 0] = np.int32(after[i]) - np.int32(before[i])
-            slopes[count, 1] = np.int32(below[i]) - np.int32(above[i])
-            count += steep[i]
-    one = np.float32(1)
+        for eight in range(len(eights)):  # each eighth flag is a bit of a byte that tells where the set ones are
+            byte = (eights[eight] * GATHER) >> np.uint64(56)
+            first, found, room = np.int32(v * width + margin + 8 * eight), SET[byte], places[count:]
+            for k in range(8):
+                room[k] = first + np.int32(found[k])
+            count += NUMBER[byte]
+    flat_on, flat_off = on.ravel(), off.ravel()
+    room = np.empty((9, count), np.float32)
+    slope_u, slope_v, light, rest = room[0], room[1], room[2], room[3]
+    uus, uvs, vvs, rus, rvs = room[4], room[5], room[6], room[7], room[8]
+    for k in range(count):
+        at = places[k]
+        slope_u[k] = np.int32(flat_on[at + 1]) - np.int32(flat_on[at - 1])
+        slope_v[k] = np.int32(flat_on[at + width]) - np.int32(flat_on[at - width])
+        light[k] = flat_on[at]
+    one, part = np.float32(1), np.float32(0.01)
     start_u, start_v = shift[0], shift[1]
     for _ in range(steps):
         shift_u, shift_v = int(np.floor(-shift[0])), int(np.floor(-shift[1]))
         part_u, part_v = np.float32(-shift[0] - shift_u), np.float32(-shift[1] - shift_v)
         c00, c01 = (one - part_u) * (one - part_v), part_u * (one - part_v)
         c10, c11 = (one - part_u) * part_v, part_u * part_v
+        apart = shift_v * width + shift_u
+        for k in range(count):
+            at = places[k] + apart
+            moved = c00 * np.float32(flat_off[at]) + c01 * np.float32(flat_off[at + 1])
+            moved += c10 * np.float32(flat_off[at + width]) + c11 * np.float32(flat_off[at + width + 1])
+            rest[k] = light[k] - moved
+        for k in range(count):
+            gu, gv = slope_u[k], slope_v[k]
+            weight = one / (one + rest[k] * rest[k] * part)
+            uus[k], uvs[k], vvs[k] = weight * gu * gu, weight * gu * gv, weight * gv * gv
+            rus[k], rvs[k] = weight * gu * rest[k], weight * gv * rest[k]
         uu, uv, vv, ru, rv = 1e-3, 0.0, 1e-3, 0.0, 0.0
         for k in range(count):
-            v, u, gu, gv = places[k, 0], places[k, 1], slopes[k, 0], slopes[k, 1]
-            a, b = v + shift_v, u + shift_u
-            moved = c00 * np.float32(off[a, b]) + c01 * np.float32(off[a, b + 1])
-            moved += c10 * np.float32(off[a + 1, b]) + c11 * np.float32(off[a + 1, b + 1])
-            rest = np.float32(on[v, u]) - moved
-            weight = one / (one + rest * rest * np.float32(0.01))
-            uu += weight * gu * gu
-            uv += weight * gu * gv
-            vv += weight * gv * gv
-            ru -= weight * gu * rest
-            rv -= weight * gv * rest
+            uu += uus[k]
+            uv += uvs[k]
+            vv += vvs[k]
+            ru -= rus[k]
+            rv -= rvs[k]
         # along the only edge in sight the images tell no shift: there it stays where it began
         held = HELD * (uu + vv)
         uu, vv = uu + held, vv + held

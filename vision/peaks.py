@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vision.capture import Image
 from vision.compiled import compiled
+from vision.workspace import lent
 
 Array = NDArray[Any]  # of floats
 Peaks = NDArray[np.int64]
@@ -23,6 +24,7 @@ CLEARLY_NO_NOISE = 2.5  # standard deviations: what gained more does not tell ho
 APART_STILL, APART_MOVED = 0.04, 0.1  # px by which two half-size images may lie apart, as a standard deviation
 SOFTENED = 0.3  # of a pixel's noise, what is left in a Gaussian mean over 5 × 5
 MOST = 180  # peaks kept, the strongest; the grid has 121 dots
+NEAREST = np.array(sorted(set(range(25)) - {12}, key=lambda k: (k // 5 - 2) ** 2 + (k % 5 - 2) ** 2))  # of 5 × 5 places
 AROUND = 3  # px about a box, of which 7 × 7 means and slopes are taken
 
 
@@ -53,7 +55,8 @@ def gained(off: Image, on: Image, motion: Array, reach: Reach) -> Peaks:
     left, top, right, bottom = reach.box
     left, top = max(left - AROUND, 0), max(top - AROUND, 0)
     right, bottom = min(right + AROUND, on.shape[1]), min(bottom + AROUND, on.shape[0])
-    gain, step = np.zeros((2, bottom - top, right - left), np.float32)
+    height, width = bottom - top, right - left
+    gain, step = lent("gains", (2 * on.size,), np.float32)[: 2 * height * width].reshape(2, height, width)
     _gains(off, on, -float(motion[0]) / 2, -float(motion[1]) / 2, left, top, gain, step)
     apart = APART_MOVED if motion.any() else APART_STILL
     return _strongest(gain, step, max(_noise(gain, CLEARLY_NO_NOISE), LEAST_NOISE), apart, reach.mask, left, top)
@@ -83,8 +86,8 @@ def _strongest(gain: Array, step: Array, noise: float, apart: float, mask: Image
 @compiled
 def _gains(off: Image, on: Image, du: float, dv: float, box_left: int, box_top: int, gain: Array, step: Array) -> None:
     """Write gain (h, w) of the box that begins at (box_left, box_top): on minus off, sampled (du, dv) away, mean of
-    3 × 3 over that of 7 × 7; step (h, w): slope of the sampled off, grey levels per px. Untouched along the border of
-    image and box."""
+    3 × 3 over that of 7 × 7; step (h, w): slope of the sampled off, grey levels per px. Zero along the border of image
+    and box."""
     rows, columns = gain.shape
     height, width = on.shape
     shift_u, shift_v = int(np.floor(du)), int(np.floor(dv))
@@ -96,14 +99,19 @@ def _gains(off: Image, on: Image, du: float, dv: float, box_left: int, box_top: 
     top, bottom = max(box_top, -shift_v), min(box_top + rows, height - shift_v - 1)
     inner = right - left
     if inner < 8 or bottom - top < 8:
+        gain[:], step[:] = 0, 0
         return
+    first, start, count = top + 3 - box_top, left - box_left + 3, inner - 6
+    for row in range(rows):
+        whole = row < first or row >= bottom - 3 - box_top
+        gain[row, : columns if whole else start], step[row, : columns if whole else start] = 0, 0
+        gain[row, start + count :], step[row, start + count :] = 0, 0
     # the last seven rows that were sampled, and their differences
     still = np.empty((8, inner), np.float32)
     difference = np.empty((8, inner), np.float32)
     three, seven = np.empty(inner, np.float32), np.empty(inner, np.float32)
     pairs, beside = np.empty(inner, np.float32), np.empty(inner, np.float32)
     ninth, forty_ninth, sixth = np.float32(1 / 9), np.float32(1 / 49), np.float32(1 / 6)
-    count = inner - 6
     for v in range(top, bottom):
         upper, lower = off[v + shift_v, left + shift_u :], off[v + shift_v + 1, left + shift_u :]
         upper_next, lower_next = upper[1:], lower[1:]
@@ -130,7 +138,6 @@ def _gains(off: Image, on: Image, du: float, dv: float, box_left: int, box_top: 
         p0, p2, p4, s6 = pairs, pairs[2:], pairs[4:], seven[6:]
         t2, t3, t4, b2, b4 = three[2:], three[3:], three[4:], beside[2:], beside[4:]
         a2, a3, a4, d2, d3, d4 = above[2:], above[3:], above[4:], below[2:], below[3:], below[4:]
-        start = left - box_left + 3
         out, slope = gain[m - box_top, start:], step[m - box_top, start:]
         for i in range(count):
             out[i] = ninth * (t2[i] + t3[i] + t4[i]) - forty_ninth * (p0[i] + p2[i] + p4[i] + s6[i])
@@ -193,7 +200,7 @@ def _maxima(gain: Array, step: Array, noise: float, apart: float, threshold: flo
                 continue
             value = values[u] / max(least, part * slopes[u])
             highest = True
-            for k in range(25):
+            for k in NEAREST:
                 b, a = v + k // 5 - 2, u + k % 5 - 2
                 other = gain[b, a] / max(least, part * step[b, a])
                 if other > value or (other == value and k < 12):

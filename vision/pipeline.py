@@ -152,8 +152,9 @@ class Eye:
         axis, reasons = found.axis, found.reasons
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]
-        width = chord(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
-        direction = heading(edges, axis, camera, surface, _station_near(dots, axis)) if edges else None
+        near = _station_near(dots, axis) if edges else None
+        width = chord(edges, axis, camera, surface, near) if near is not None else None
+        direction = heading(edges, axis, camera, surface, near) if near is not None else None
         if direction is None and np.isfinite(axis):
             direction = axis
         sharp = sharpness(clean, edges)

@@ -55,7 +55,7 @@ def _equations(
 
     pixels (side, 3 · WIDE): signal, weights, and 1 where burnt, weightless from column `side` on. sums (17 · WIDE,):
     float32, room for sums down each column, which are taken side by side and only then put together."""
-    reach, wide = side // 2, (side + 3) // 4 * 4
+    reach, wide = side // 2, (side + 7) // 8 * 8
     u, v, level, base = spot[0], spot[1], np.float32(spot[2]), np.float32(spot[3])
     pxx, pxy, pyy = shape[0], shape[1], shape[2]
     sums[:] = 0.0

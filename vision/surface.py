@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.surface_kernels import consensus, median, robust
+from vision.surface_kernels import fit
 
 Array = NDArray[Any]  # of floats
 
@@ -63,42 +63,10 @@ def fit_surface(rays: Array, inverse_depth: Array, sigma: Array) -> Surface | No
     """
     if len(rays) < 4:
         return None
-    # A point may stand off its neighbours by a little relief of the surface, which no sensor noise explains.
-    relief = np.hypot(sigma, 0.002 * inverse_depth)
-    terms, inverse_depth = _terms(rays), np.ascontiguousarray(inverse_depth)
-    start = np.empty(3)
-    # A plane through a few neighbours is rough: what counts is to be on the same surface, not within the noise.
-    consensus(terms, inverse_depth, relief, 2 * SLOPE, start)
-    far = np.abs(inverse_depth - terms[:, :3] @ start) > 4 * relief + LARGEST_BEND * inverse_depth
-    relief = np.where(far, NOWHERE, relief)  # what stands elsewhere pulls at nothing
-    # The little information that a surface's slope is within SLOPE and its bend within BEND of none.
-    held = 1 / (SPREAD * median(inverse_depth)) ** 2
-    coefficients, weight = np.zeros(6), np.empty(len(rays))
-    coefficients[:3] = start
-    flat_cost = robust(terms, inverse_depth, relief, held, coefficients[:3], weight)
-    count, bent, unmodelled = 3, False, 0.0
-    near = len(rays) - int(np.count_nonzero(far))
-    if near >= 16:
-        curved, curved_weight = np.zeros(6), np.empty(len(rays))
-        curved[:3] = start
-        curved_cost = robust(terms, inverse_depth, relief, held, curved, curved_weight)
-        reach = np.hypot(rays[:, 1], rays[:, 2]).min()
-        better = (flat_cost - curved_cost) / 3 / max(curved_cost / (near - 6), 1.0)
-        # A bend that is there and not modelled shows in the depth where the optical axis meets the surface.
-        unmodelled = abs(float(coefficients[0] - curved[0])) * min(max((better - 1) / 5, 0.0), 1.0)
-        if better > 6 and reach < 0.08:
-            unmodelled = 0.0
-            coefficients, weight, count, bent = curved, curved_weight, 6, True
-    design = terms[:, :count]
-    information = (design * weight[:, None]).T @ design
-    information[np.diag_indices(count)] += held[:count]
-    covariance = np.linalg.inv(information)[:3, :3]
-    residual = (inverse_depth - design @ coefficients[:count]) / relief
-    inliers = (np.abs(residual) < 5) & ~far
-    freedom = max(int(inliers.sum()) - count, 1)
-    covariance *= max(1.0, float((residual[inliers] ** 2).sum()) / freedom)
-    covariance[0, 0] += unmodelled**2
-    a, b, c = coefficients[:3]
+    rays, inverse_depth, sigma = (np.ascontiguousarray(values) for values in (rays, inverse_depth, sigma))
+    coefficients, covariance, inliers = np.empty(6), np.empty((3, 3)), np.empty(len(rays), np.bool_)
+    bent = fit(rays, inverse_depth, sigma, SLOPE, SPREAD, LARGEST_BEND, NOWHERE, coefficients, covariance, inliers)
+    a, b, c = coefficients[:3].tolist()
     if a <= 0:
         return None
     jacobian = np.array([[-1 / a**2, 0, 0], [b / a**2, -1 / a, 0], [c / a**2, 0, -1 / a]])

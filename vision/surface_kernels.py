@@ -172,3 +172,79 @@ def robust(design: Array, values: Array, sigma: Array, held: Array, solution: Ar
             residual -= design[n, i] * solution[i]
         cost += min(abs(residual) / sigma[n], 5.0) ** 2
     return cost
+
+
+@compiled
+def fit(
+    rays: Array, inverse_depth: Array, sigma: Array, held_slope: float, spread: Array, largest_bend: float,
+    nowhere: float, coefficients: Array, covariance: Array, inliers: NDArray[np.bool_],
+) -> bool:  # fmt: skip
+    """The surface through points at inverse depths (n,), known to sigma (n,), along rays (n, 3); whether it is bent.
+
+    held_slope: of a blade's surface; spread (6,): of its terms, over the inverse depth; both as standard deviations.
+    largest_bend: relative change of inverse depth from the plane that most lie on, past which a point is elsewhere and
+    counts as one known to `nowhere`. Written: coefficients (6,) of inverse depth in terms of 1, y, z, y², yz, z²,
+    covariance (3, 3) of the first three, inliers (n,)."""
+    count = len(rays)
+    terms, relief, weight, values = np.empty((count, 6)), np.empty(count), np.empty(count), inverse_depth
+    far, start = np.empty(count, np.bool_), np.empty(3)
+    for n in range(count):
+        y, z = rays[n, 1], rays[n, 2]
+        terms[n, 0], terms[n, 1], terms[n, 2] = 1.0, y, z
+        terms[n, 3], terms[n, 4], terms[n, 5] = y * y, y * z, z * z
+        # A point may stand off its neighbours by a little relief of the surface, which no sensor noise explains.
+        relief[n] = np.sqrt(sigma[n] ** 2 + (0.002 * values[n]) ** 2)
+    # A plane through a few neighbours is rough: what counts is to be on the same surface, not within the noise.
+    consensus(terms, values, relief, 2 * held_slope, start)
+    near, reach = 0, np.inf
+    for n in range(count):
+        off = values[n] - (start[0] + start[1] * terms[n, 1] + start[2] * terms[n, 2])
+        far[n] = abs(off) > 4 * relief[n] + largest_bend * values[n]
+        near += not far[n]
+        relief[n] = nowhere if far[n] else relief[n]  # what stands elsewhere pulls at nothing
+        reach = min(reach, np.sqrt(terms[n, 3] + terms[n, 5]))
+    # The little information that a surface's slope and bend are as small as they usually are.
+    held, middle = np.empty(6), median(values)
+    for i in range(6):
+        held[i] = 1 / (spread[i] * middle) ** 2
+    coefficients[:] = 0.0
+    coefficients[:3] = start
+    flat_cost = robust(terms, values, relief, held, coefficients[:3], weight)
+    known, bent, unmodelled = 3, False, 0.0
+    if near >= 16:
+        curved, curved_weight = np.zeros(6), np.empty(count)
+        curved[:3] = start
+        curved_cost = robust(terms, values, relief, held, curved, curved_weight)
+        better = (flat_cost - curved_cost) / 3 / max(curved_cost / (near - 6), 1.0)
+        # A bend that is there and not modelled shows in the depth where the optical axis meets the surface.
+        unmodelled = abs(coefficients[0] - curved[0]) * min(max((better - 1) / 5, 0.0), 1.0)
+        if better > 6 and reach < 0.08:
+            unmodelled, known, bent, weight = 0.0, 6, True, curved_weight
+            for i in range(6):
+                coefficients[i] = curved[i]
+    information, inverse = np.empty((known, known)), np.zeros((3, known))
+    information[:] = 0.0
+    squares, inside = 0.0, 0
+    for n in range(count):
+        off = values[n]
+        for i in range(known):
+            off -= terms[n, i] * coefficients[i]
+            for j in range(i + 1):
+                information[i, j] += terms[n, i] * weight[n] * terms[n, j]
+        off /= relief[n]
+        inliers[n] = abs(off) < 5 and not far[n]
+        squares += off * off if inliers[n] else 0.0
+        inside += inliers[n]
+    for i in range(known):
+        information[i, i] += held[i]
+    scale = max(1.0, squares / max(inside - known, 1))
+    factor = np.empty((known, known))
+    for i in range(3):
+        factor[:] = information
+        inverse[i, i] = 1.0
+        solve(factor, inverse[i])
+        for j in range(3):
+            inverse[i, j] *= scale
+    inverse[0, 0] += unmodelled**2
+    covariance[:] = inverse[:, :3]
+    return bent
