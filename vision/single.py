@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,8 +18,10 @@ from vision.evidence import Blade, texture_between
 from vision.laser_fan import Fan, fan_of, middle_place
 from vision.lines import hough_lines, sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
+from vision.outlined import with_outline
 from vision.quality import exposure, sharpness
 from vision.reduction import tones
+from vision.silhouette import silhouette_of
 from vision.stopwatch import Now, Stopwatch
 from vision.tip import tip_of
 
@@ -32,6 +35,7 @@ BEYOND_PX = 6.0  # a dot's middle may lie so far beyond an edge
 WITHIN_PX = 5.0  # so far within an edge a dot would be seen
 BORDER_PX = 6.0  # of the image, within which it may not
 MOST_MISSING = 0.2  # share of the dots within the edges, beyond which they are not believed
+MOST_MISSING_INSIDE = 0.1  # of those within a silhouette that is believed
 MOST_LINES = 220
 COLOURLESS = 1.5  # grey levels by which colours differ on average in a grey image
 
@@ -139,14 +143,31 @@ def _outline(clean: Image, dots: Array, places: Array, fan: Fan, in_view: NDArra
         found = with_cut_end(found, weigh(lines, blade, smooth, sensor_noise(clean), None), blade, size)
         missing = _share_missing(found, dots, places, fan, in_view)
         if found.edges and missing < MOST_MISSING:
-            return found
+            return _held_against_outline(found, clean, smooth, dots, places, fan, in_view)
         if found.edges:
             found = Found(
                 (), found.axis, None, (f"no edge: {missing:.0%} of the dots within the likeliest ones are missing",)
             )
         refused = refused or found
     assert refused is not None
-    return refused
+    return _held_against_outline(refused, clean, smooth, dots, places, fan, in_view)
+
+
+def _held_against_outline(
+    found: Found, clean: Image, smooth: Image, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_]
+) -> Found:
+    """What was found, or what the blade's silhouette tells where the blade stands out from all that is around it and
+    no dots are missing on it."""
+    noise, half = sensor_noise(clean), (np.array(clean.shape[1::-1]) - 1) / 2
+    silhouette = silhouette_of(clean, dots + half, noise)
+    if silhouette is None:
+        return found
+    core = cv2.erode(silhouette.mask, np.ones((2 * round(WITHIN_PX) + 1,) * 2, np.uint8))
+    across, down = np.rint(np.clip(places + half, 0, 2 * half)).astype(int).T
+    count = fan.least_missing(in_view & (core[down, across] > 0))
+    if count > MOST_MISSING_INSIDE * (count + len(dots)):
+        return found
+    return with_outline(found, silhouette, smooth, noise)
 
 
 def _share_missing(found: Found, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_]) -> float:

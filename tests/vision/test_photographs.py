@@ -164,6 +164,23 @@ def test_a_photograph_turned_by_any_angle_shows_the_same_edges(degrees: float) -
         assert any(turn < 4 and shift < 15 for turn, shift in errors), errors
 
 
+@pytest.mark.parametrize("degrees", [39.4, 46.6, 133.0, 222.9, 327.0])
+def test_no_edge_of_a_rounded_tip_that_the_frame_cuts_anyhow_is_wrong_without_a_word(degrees: float) -> None:
+    name = "end_detected.png"
+    image = photograph(name)
+    height, width = image.shape
+    a = np.deg2rad(degrees)
+    turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+    side = int(min(width, height) / (abs(np.cos(a)) + abs(np.sin(a))))  # the largest square that lies in it
+    shift = np.full(2, (side - 1) / 2) - turn @ np.array([(width - 1) / 2, (height - 1) / 2])
+    turned = cv2.warpAffine(image, np.column_stack([turn, shift]), (side, side), flags=cv2.INTER_CUBIC)
+    seen = observe_single(np.asarray(turned, np.uint8))
+    assert seen.valid == bool(seen.edges) and seen.valid != bool(seen.reasons)
+    for edge in seen.edges:
+        errors = [off(edge.line.theta - a, edge.line.rho * 612 / width, line) for line in (*FRAMES[name]["edges"],)]
+        assert any(angle < 5 and apart < 18 for angle, apart in errors), errors
+
+
 @pytest.mark.parametrize("channel", [1, 2], ids=["green", "red"])
 def test_a_coloured_laser_on_grey_is_seen_as_well(channel: int) -> None:
     name = "normal_navigation.png"
