@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, radians
+from math import cos, log2, radians
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.beside_kernels import shares_beyond
+from vision.beside_kernels import facing
 from vision.capture import Image
 from vision.evidence import (
     Blade,
@@ -19,9 +19,8 @@ from vision.evidence import (
     missing,
     nearer_lines,
     parallax,
-    runs,
     runs_at_focus,
-    support_within,
+    told_by_dots,
     typical_step,
 )
 from vision.lines import Profiles, refine_lines
@@ -69,34 +68,27 @@ class Candidate:
 def weigh(lines: Array, blade: Blade, smooth: Image, noise: float, other: OtherEye | None) -> list[Candidate]:
     """Candidates out of lines (k, 2) of (theta, signed rho), refined, with what speaks for them."""
     dots = blade.dots
-    normal = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
-    rho = np.ascontiguousarray(lines[:, 1])
-    inside, outside = shares_beyond(dots, -normal, -rho, -7.0), shares_beyond(dots, normal, rho, -7.0)
-    flip = outside > inside
-    keep = np.maximum(inside, outside) > 0.99 - blade.strays
-    normal[flip], rho = -normal[flip], np.where(flip, -rho, rho)
-    normal, rho = normal[keep][:CANDIDATES], rho[keep][:CANDIDATES]
-    if len(rho) == 0:
+    normal, rho = np.empty((CANDIDATES, 2)), np.empty(CANDIDATES)
+    count = facing(np.ascontiguousarray(lines), dots, -7.0, 0.99 - blade.strays, normal, rho)
+    if count == 0:
         return []
-    rough = _promising(normal, rho, blade, smooth, noise)
-    seen = rough[0]
+    rough = _promising(normal[:count], rho[:count], blade, smooth, noise)
+    seen, start, stop = rough
     if len(seen.rho) == 0:
         return []
-    steps = typical_step(seen, seen.agrees)
-    nearer = nearer_lines(seen, blade, smooth, steps, rough[1], rough[2], noise)
-    passes = [rough, _promising(*nearer, blade, smooth, noise)] if len(nearer[1]) else [rough]
-    normal, rho = np.vstack([one[0].normal for one in passes]), np.concatenate([one[0].rho for one in passes])
-    start, stop = np.concatenate([one[1] for one in passes]), np.concatenate([one[2] for one in passes])
-    profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, start, stop), 4, 0.6, LAST_SAMPLES)
-    crossed = shares_beyond(dots, profile.normal, profile.rho, 2.5)
-    low, high = beside(dots, profile.normal)
-    support = support_within(profile, low, high)
-    first, last = runs(profile)
+    normal, rho = seen.normal, seen.rho
+    nearer = nearer_lines(seen, blade, smooth, typical_step(seen, seen.agrees), start, stop, noise)
+    if len(nearer[1]):
+        more, more_start, more_stop = _promising(*nearer, blade, smooth, noise)
+        normal, rho = np.concatenate((normal, more.normal)), np.concatenate((rho, more.rho))
+        start, stop = np.concatenate((start, more_start)), np.concatenate((stop, more_stop))
+    profile = refine_lines(smooth, normal, rho, noise, _nearest_to_middle(start, stop), 4, 0.6, LAST_SAMPLES)
+    told = told_by_dots(profile, dots, 2.5)
+    crossed, _, _, support, first, last = told
     which = np.flatnonzero((crossed <= blade.strays) & ((support >= LEAST_SUPPORT) | (last - first > LEAST_RUN)))
     if len(which) == 0:
         return []
-    profile = profile.take(which)
-    found = _weighed(profile, blade, smooth, noise, other, low[which], high[which])
+    found = _weighed(profile.take(which), blade, smooth, noise, other, told[:4, which])
     # Of fits to one step that which follows more of it is right: a line that starts askew may lose half of it.
     found.sort(key=lambda c: -c.worth - _followed(c) / FOLLOWED_PX)
     ways = [c.outward.tolist() for c in found]
@@ -126,12 +118,10 @@ def _promising(normal: Array, rho: Array, blade: Blade, smooth: Image, noise: fl
     dots beside it and a step, or a step where none does."""
     dots = blade.dots
     low, high = beside(dots, normal)
-    profile = refine_lines(smooth, normal, rho, noise, np.clip(0.0, low, high), 8, 2.4, 40)
-    low, high = beside(dots, profile.normal)
-    support = support_within(profile, low, high)
-    first, last = runs(profile)
+    profile = refine_lines(smooth, normal, rho, noise, _nearest_to_middle(low, high), 8, 2.4, 40)
+    crossed, low, high, support, first, last = told_by_dots(profile, dots, 5.0)
     which = (support > 0.6 * LEAST_SUPPORT) | (last - first > LEAST_RUN)
-    which &= shares_beyond(dots, profile.normal, profile.rho, 5.0) < 0.2
+    which &= crossed < 0.2
     overlap = np.minimum(high, last) - np.maximum(low, first) > LEAST_RUN
     start, stop = np.where(overlap, np.maximum(low, first), first), np.where(overlap, np.minimum(high, last), last)
     start, stop = np.where(support > LEAST_SUPPORT, low, start), np.where(support > LEAST_SUPPORT, high, stop)
@@ -139,58 +129,58 @@ def _promising(normal: Array, rho: Array, blade: Blade, smooth: Image, noise: fl
     return profile.take(chosen), start[chosen], stop[chosen]
 
 
+def _nearest_to_middle(start: Array, stop: Array) -> Array:
+    """The places (k,) between starts and stops that are nearest to the foot of the image centre."""
+    return np.asarray(np.minimum(np.maximum(0.0, start), stop))
+
+
 def _weighed(
-    profile: Profiles, blade: Blade, smooth: Image, noise: float, other: OtherEye | None, low: Array, high: Array
+    profile: Profiles, blade: Blade, smooth: Image, noise: float, other: OtherEye | None, told_by_dots: Array
 ) -> list[Candidate]:
-    dots = blade.dots
-    crossed = shares_beyond(dots, profile.normal, profile.rho, 2.5)
-    support = support_within(profile, low, high)
+    """What speaks for each of k lines; told_by_dots (4, k): of what dots tell, the share of them past it, the stretch
+    (low, high) beside them, and the support there."""
+    low, high = told_by_dots[1], told_by_dots[2]
     first, last = runs_at_focus(profile)
     on_run = (profile.t >= first[:, None] - 1) & (profile.t <= last[:, None] + 1)
-    step = typical_step(profile, on_run)
-    told = np.full(len(crossed), np.nan)
-    if other is not None:
-        told = parallax(profile, other, on_run, noise)
-    before = blocked(profile, blade, smooth, step, low, high, noise)
+    steps = typical_step(profile, on_run)
+    shown = np.full(len(low), np.nan) if other is None else parallax(profile, other, on_run, noise)
+    before = blocked(profile, blade, smooth, steps, low, high, noise)
     start, stop = np.maximum(low, first), np.minimum(high, last)
     apart = stop - start < LEAST_RUN
     start, stop = np.where(apart, first, start), np.where(apart, last, stop)
-    before_run = blocked(profile, blade, smooth, step, start, stop, noise)
-    empty, beyond = missing(blade, profile, low, high)
-    empty_run, beyond_run = missing(blade, profile, start, stop)
-    likely = (before < 0.5) & ~(told < 0.4) & (empty < 0.3) & (support >= LEAST_SUPPORT)
-    strongest = max(float(np.max(np.where(likely, step, 0))), 1.0)
-
-    clear = 0.35 * np.clip(np.log2(np.maximum(step, 1e-9) / strongest), -3.0, 0.5)
-    clear += 0.35 * np.clip(np.log2(np.maximum(step, 1e-9) / max(blade.texture, 1.0)), -2.0, 1.0)
-    clear += np.where(np.isnan(told), 0.2, np.where(told > 0.5, 0.6 * told, -7.0 * (0.5 - told))) - 5.0 * crossed
-
-    # What lies before a step at the blade's own depth, with no dots missing up to it, is a seam or a shadow.
-    behind = 1.0 - np.clip(np.nan_to_num(told - 0.5) / 0.4, 0.0, 1.0)
-
-    def sums(hidden: Array, empty: Array, beyond: Array) -> Array:
-        hidden = hidden * np.where(empty < FEW_MISSING, behind, 1.0)
-        against = 2.0 * hidden + 3.0 * np.maximum(hidden - 0.5, 0.0) + (5.0 if blade.grid_known else 2.5) * empty
-        return np.asarray(clear - against + 0.15 * np.minimum(beyond, 6))
-
-    least = np.where((beyond > 0) & (empty == 0), LEAST_SEEN, LEAST_SUPPORT)
-    value = np.where(support >= least, 2.0 * support + sums(before, empty, beyond), -np.inf)
-    worth = sums(before_run, empty_run, beyond_run)
-    return [
-        Candidate(
-            profile.normal[k],
-            float(profile.rho[k]),
-            float(support[k]),
-            float(told[k]),
-            float(step[k]),
-            float(before[k]),
-            float(empty[k]),
-            int(beyond[k]),
-            (float(first[k]), float(last[k])),
-            float(value[k]),
-            float(worth[k]),
-            profile,
-            k,
+    before_run = blocked(profile, blade, smooth, steps, start, stop, noise)
+    gone, gone_on_run = missing(blade, profile, low, high), missing(blade, profile, start, stop)
+    known = (*told_by_dots, steps, shown, before, *gone, before_run, *gone_on_run, first, last, profile.rho)
+    rows = np.stack(known).T.tolist()
+    strongest = 1.0
+    for _, _, _, support, step, told, hidden, empty, *_ in rows:
+        if hidden < 0.5 and not told < 0.4 and empty < 0.3 and support >= LEAST_SUPPORT:
+            strongest = max(strongest, step)
+    found = []
+    for k, row in enumerate(rows):
+        crossed, _, _, support, step, told, hidden, empty, beyond, hidden_run, empty_run, beyond_run, *_, rho = row
+        clear = 0.35 * min(max(log2(max(step, 1e-9) / strongest), -3.0), 0.5)
+        clear += 0.35 * min(max(log2(max(step, 1e-9) / max(blade.texture, 1.0)), -2.0), 1.0)
+        clear += 0.2 if told != told else 0.6 * told if told > 0.5 else -7.0 * (0.5 - told)
+        clear -= 5.0 * crossed
+        # What lies before a step at the blade's own depth, with no dots missing up to it, is a seam or a shadow.
+        behind = 1.0 - min(max((told - 0.5) / 0.4, 0.0), 1.0) if told == told else 1.0
+        per_missing = 5.0 if blade.grid_known else 2.5
+        value, worth = (
+            clear - _against(seen * behind if lost < FEW_MISSING else seen, per_missing * lost, past)
+            for seen, lost, past in ((hidden, empty, beyond), (hidden_run, empty_run, beyond_run))
         )
-        for k in range(len(crossed))
-    ]
+        enough = support >= (LEAST_SEEN if beyond > 0 and empty == 0 else LEAST_SUPPORT)
+        value = 2.0 * support + value if enough else float("-inf")
+        ends = (row[12], row[13])
+        found.append(
+            Candidate(
+                profile.normal[k], rho, support, told, step, hidden, empty, int(beyond), ends, value, worth, profile, k
+            )
+        )
+    return found
+
+
+def _against(hidden: float, missing_dots: float, beyond: float) -> float:
+    """What speaks against a line of which a share is hidden, missing dots up to it, and for it as many beyond."""
+    return 2.0 * hidden + 3.0 * max(hidden - 0.5, 0.0) + missing_dots - 0.15 * min(beyond, 6.0)

@@ -9,21 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.beside_kernels import outermost, shares_agreeing, stretches_beside
+from vision.beside_kernels import outermost, runs_about, stretches_beside, told_beside
 from vision.camera import Camera, StereoPair
 from vision.capture import Image
-from vision.evidence_kernels import (
-    lines_before,
-    longest_runs,
-    median_steps,
-    missing_dots,
-    runs_about,
-    shares_above,
-)
+from vision.evidence_kernels import lines_before, median_steps, missing_dots, shares_above
 from vision.lane_kernels import shares_at_depth, steps_before, steps_between
 from vision.lines import Profiles
 from vision.surface import Surface
-from vision.surface_kernels import median
 
 Array = NDArray[Any]  # of floats
 
@@ -106,9 +98,15 @@ def texture_between(smooth: Image, dots: Array) -> float:
     return float(change[below] + part * (change[min(below + 1, len(change) - 1)] - change[below]))
 
 
-def support_within(profile: Profiles, low: Array, high: Array) -> Array:
-    """Share (k,) of the places between low and high (k,) that agree, of all where too few lie there."""
-    return np.asarray(shares_agreeing(profile.t, profile.agrees, low - 8, high + 8, 6))
+def told_by_dots(profile: Profiles, dots: Array, past_px: float) -> Array:
+    """(crossed, low, high, support, first, last) (6, k) of k lines: the share of the dots more than past_px past each,
+    the stretch of it that has dots beside it, the share of that at which there is its step, and the longest stretch on
+    which this goes on with small gaps."""
+    told = np.empty((6, len(profile.rho)))
+    told_beside(
+        dots, profile.normal, profile.rho, profile.t, profile.agrees, past_px, 0.04, 8.0, 6, 28.0, LONGEST_GAP, told
+    )
+    return told
 
 
 def beside(dots: Array, normal: Array) -> tuple[Array, Array]:
@@ -123,16 +121,6 @@ def typical_step(profile: Profiles, within: NDArray[np.bool_]) -> Array:
     median = np.empty(len(within))
     median_steps(profile.step, profile.agrees, within, median)
     return median
-
-
-def runs(profile: Profiles) -> tuple[Array, Array]:
-    """First and last place (k,) of the longest stretch of each line on which its step goes on with small gaps."""
-    first, last = np.empty((2, len(profile.t)))
-    if len(profile.t):
-        length = max(median(profile.t[:, 1] - profile.t[:, 0]), 1e-6)
-        window = min(max(round(28.0 / length), 3), 9)
-        longest_runs(profile.t, profile.agrees, window, LONGEST_GAP, first, last)
-    return first, last
 
 
 def runs_at_focus(profile: Profiles) -> tuple[Array, Array]:

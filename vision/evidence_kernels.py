@@ -1,4 +1,4 @@
-"""Inner loops over what speaks for lines: their typical steps, the runs of these, missing dots."""
+"""Inner loops over what speaks for lines: their typical steps, steps before them, missing dots."""
 
 from __future__ import annotations
 
@@ -40,73 +40,6 @@ def median_steps(step: Floats, agrees: Flags, within: Flags, median: Floats) -> 
         median[line] = 0.0
         if count > 0:
             median[line] = _median(sizes[:count])
-
-
-@compiled
-def _dense(agrees: Flags, window: int, dense: Flags) -> None:
-    """Whether more than half of the `window` places about each place agree."""
-    places = len(agrees)
-    for m in range(places):
-        count = 0
-        for i in range(max(m - window // 2, 0), min(m - window // 2 + window, places)):
-            count += agrees[i]
-        dense[m] = 2 * count > window
-
-
-@compiled
-def longest_runs(t: Floats, agrees: Flags, window: int, gap: float, first: Floats, last: Floats) -> None:
-    """First and last place (k,) of the longest stretch of each line, at places t (k, m), on which steps go on with gaps
-    no longer than `gap`; the line's first place twice where there is none."""
-    lines, places = t.shape
-    dense = np.empty(places, np.bool_)
-    for line in range(lines):
-        _dense(agrees[line], window, dense)
-        length = max(t[line, 1] - t[line, 0], 1e-6)
-        start, stop, best_start, best_stop = -1, -1, 0, 0
-        for m in range(places):
-            if not (dense[m] and agrees[line, m]):
-                continue
-            if start < 0 or (m - stop) * length > gap:
-                start = m
-            stop = m
-            if stop - start > best_stop - best_start or best_stop == 0:
-                best_start, best_stop = start, stop
-        first[line], last[line] = t[line, best_start], t[line, best_stop]
-
-
-@compiled
-def runs_about(t: Floats, agrees: Flags, focus: Floats, window: int, gap: float, first: Floats, last: Floats) -> None:
-    """First and last place (k,) between which each line's steps go on about its focus (k,) with gaps no longer than
-    `gap`; the whole line where steps are nowhere dense."""
-    lines, places = t.shape
-    dense = np.empty(places, np.bool_)
-    for line in range(lines):
-        _dense(agrees[line], window, dense)
-        at = 0
-        for m in range(places):
-            if abs(t[line, m] - focus[line]) < abs(t[line, at] - focus[line]):
-                at = m
-        nearest = -1
-        for m in range(places):
-            if dense[m] and (nearest < 0 or abs(m - at) < abs(nearest - at)):
-                nearest = m
-        if nearest < 0:
-            first[line], last[line] = t[line, 0], t[line, places - 1]
-            continue
-        length = t[line, 1] - t[line, 0]
-        start = stop = nearest
-        for m in range(nearest, places):
-            if (m - stop) * length > gap:
-                break
-            if dense[m]:
-                stop = m
-        for back in range(nearest + 1):
-            m = nearest - back
-            if (start - m) * length > gap:
-                break
-            if dense[m]:
-                start = m
-        first[line], last[line] = t[line, start], t[line, stop]
 
 
 @compiled

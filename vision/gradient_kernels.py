@@ -186,10 +186,10 @@ def line_votes(
     for way in range(ways):
         row = place[way]
         for k in range(count):
-            a = np.int32(np.floor(angle[k] * per_rad)) + np.int32(way - spread)
-            a = a + np.int32(angles) if a < 0 else a
-            a = a + np.int32(angles) if a < 0 else a
-            turn[k] = a - np.int32(angles) if a >= angles else a
+            own = np.int32(np.floor(angle[k] * per_rad)) + np.int32(way - spread)
+            once = own + np.int32(angles) if own < 0 else own
+            twice = once + np.int32(angles) if once < 0 else once
+            turn[k] = twice - np.int32(angles) if twice >= angles else twice
         for k in range(count):
             across[k], down[k] = cosine[turn[k]], sine[turn[k]]
         for k in range(count):
