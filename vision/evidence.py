@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vision.beside_kernels import outermost, runs_about, stretches_beside, told_beside
 from vision.camera import Camera, StereoPair
 from vision.capture import Image
-from vision.evidence_kernels import lines_before, median_steps, missing_dots, shares_above
+from vision.evidence_kernels import lines_before, median_steps, missing_dots, shares_above, without_shade
 from vision.lane_kernels import shares_at_depth, steps_before, steps_between
 from vision.lines import Profiles
 from vision.surface import Surface
@@ -24,6 +24,7 @@ MOST_ALONG, STEEPEST = 0.3, 0.5  # share of the places with a step before a line
 INWARD_SHARES = (np.arange(INWARD_PLACES) + 0.5) / INWARD_PLACES  # where those places lie along a stretch
 LONGEST_GAP = 45.0  # px over which an edge may be unseen and still go on
 ROUND_M = 1.0  # how far behind the surface before the camera a thick blade's edge may lie
+ACROSS, GRADUAL, SHADED = 2, 0.45, 8  # samples across a sharp step, how much of a change is left so far inward, how far
 PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
 PARALLAX_STEP = 0.4  # of a step, what the other eye has to see of it
 LEAST_PARALLAX_PX, LEAST_PLACES = 6.0, 5  # against the far background, and places with a step, that tell depths apart
@@ -145,9 +146,11 @@ def blocked(
     profile: Profiles, blade: Blade, smooth: Image, step: Array, low: Array, high: Array, noise: float
 ) -> Array:
     """Share (k,) of the stretch between low and high on which a step as strong as the line's own, and stronger than
-    the blade's texture, lies between the outermost dots and the line."""
+    the blade's texture, lies between the outermost dots and the line. Where the blade rounds away from the light it
+    darkens toward its edge, the faster the nearer, as no step does: such shade is none."""
     change, _ = _steps_before(profile, blade, smooth, low, high)
     threshold = np.maximum(np.maximum(0.7 * step, 1.7 * blade.texture), 3.0 * noise)
+    without_shade(change, noise, ACROSS, GRADUAL, SHADED)
     return np.asarray(shares_above(change, threshold))
 
 

@@ -91,6 +91,28 @@ def line_of_most(places: Floats, depths: Floats, least_apart: float, within: flo
 
 
 @compiled
+def without_shade(change: Floats, noise: float, across: int, gradual: float, most: int) -> None:
+    """Takes from the first `most` samples of change (k, m, n), steps inward of k lines at m places, what they usually
+    are where they only fade away inward: where the usual step, no greater than the one before but for noise, is more
+    than a share `gradual` of that which lies `across` samples before it."""
+    lines, places, samples = change.shape
+    count = min(most, samples - across)
+    usual, room = np.empty(count + across), np.empty(places)
+    for line in range(lines):
+        for i in range(count + across):
+            for m in range(places):
+                room[m] = change[line, m, i]
+            usual[i] = _median(room)
+            if i < across:
+                continue
+            k = i - across
+            if usual[i] <= gradual * usual[k] or usual[k + 1] > usual[k] + noise:
+                break
+            for m in range(places):
+                change[line, m, k] -= usual[k]
+
+
+@compiled
 def shares_above(change: Floats, thresholds: Floats) -> Floats:
     """Share (k,) of the places of each of k lines at which some sample of change (k, m, n) exceeds a threshold (k,)."""
     lines, places, samples = change.shape

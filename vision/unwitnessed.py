@@ -25,6 +25,7 @@ PASSES = 4  # of the robust fit
 APART, SIGMAS = 0.12, 2.0  # by how much the rises of two edges of a blade may differ, besides their standard deviations
 CLEARER = 2.0  # times the step of another edge, from which that one tells nothing: its own surroundings blur it
 DRAWN = (0.35, 1.1)  # the rise of an edge as cameras draw it, where no other edge tells
+UNSURE_SHADE = 0.5  # of what a blade's shade goes on to change from the nearest of FAR to the edge itself
 MOST_EMPTY = 0.15  # of the dots up to a step that may be missing, or the blade ends before it
 
 
@@ -59,7 +60,10 @@ def _fitted(places: Array, outward: Array, tones: Image, reach: int) -> Rise:
     sides = np.array([*FAR[:reach], NEAR])
     points = places + (np.r_[sides, -sides][:, None] * outward)[:, None]
     values = sampled(tones, points[..., 0], points[..., 1]).astype(float)
-    change = values[: len(sides)] - values[len(sides) :]
+    inner, shade = values[len(sides) :], np.zeros(values.shape[-1])
+    if reach > 1:  # a blade that rounds away from the light darkens toward its edge, all along it
+        shade = np.median(inner[0] - inner[reach - 1], axis=0) / (FAR[reach - 1] - FAR[0])
+    change = values[: len(sides)] - inner - sides[:, None, None] * shade
     full, part = change[:reach].mean(axis=0), change[reach]
     channel = np.abs(full).argmax(axis=1)[:, None]
     full, part = (np.take_along_axis(tone, channel, 1)[:, 0] for tone in (full, part))
@@ -71,7 +75,8 @@ def _fitted(places: Array, outward: Array, tones: Image, reach: int) -> Rise:
         scatter = 1.4826 * median(np.abs(residual)) + 1e-6
         weight = 1 / (1 + (residual / (2 * scatter)) ** 2) ** 2
     variance = float((weight * residual**2).sum() / weight.sum())
-    return Rise(share, float(np.sqrt(4 * variance / squares)), reach)
+    rounding = UNSURE_SHADE * FAR[0] * float((weight * shade[channel[:, 0]] ** 2).sum() / squares) ** 0.5 * share
+    return Rise(share, float(np.hypot(np.sqrt(4 * variance / squares), rounding)), reach)
 
 
 def typical_edge(candidates: list[Candidate]) -> Candidate | None:
