@@ -70,8 +70,8 @@ class BladeObservation:
     points (n, 3) m in the camera frame and sigma_m (n,) along the viewing ray, on the blade alone.
     plane: unit normal (3,) toward the camera and the point (3,) m at which the optical axis meets the surface.
     plane_covariance (3, 3): of (depth at the optical axis m, d depth / d y, d depth / d z).
-    distance_m: depth of the surface along the optical axis. nearest_m: least distance of a measured point from the
-    lens.
+    distance_m: depth of the surface along the optical axis. nearest_m: least distance from the lens to the surface
+    among its dots.
     edges: none, one or two, first the one whose outward normal lies to the left of the axis direction `heading`.
     heading: direction of the blade's axis in the image, radians modulo π. chord_m: between the two edges where both
     are seen.

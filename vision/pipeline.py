@@ -22,6 +22,7 @@ from vision.observation import BladeObservation, Dots
 from vision.peaks import Reach
 from vision.quality import exposure, sharpness
 from vision.reduction import half_green_and_tones, reduce_image, reduction_factor, to_full
+from vision.rig_doubt import rig_doubt
 from vision.single import observe_photograph
 from vision.spot_paint import without_spots
 from vision.stopwatch import Now, Stopwatch
@@ -107,8 +108,11 @@ class Eye:
         if unsure > WORST_DISTANCE:
             return self._refused(frames, watch, f"{len(blade)} dots give the distance only to {unsure:.0%}")
         if 0 < np.count_nonzero(~surface.inliers) < LEAST_OTHER:
-            matches = _without(matches, blade.take(~surface.inliers))
+            matches = matches.take(~np.isin(matches.left, blade.left[~surface.inliers]))
         blade = blade.take(surface.inliers)
+        doubt = rig_doubt(left, right, rays, matches, blade, laser)
+        if doubt is not None:
+            return self._refused(frames, watch, doubt)
         watch.lap("surface")
         return self._outlined(frames, images, left, right, rays, matches, blade, surface, watch, expected)
 
@@ -182,7 +186,7 @@ class Eye:
             plane_covariance=surface.covariance,
             distance_m=surface.depth_m,
             distance_sigma_m=float(np.sqrt(surface.covariance[0, 0])),
-            nearest_m=float(np.linalg.norm(points, axis=1).min()),
+            nearest_m=surface.nearest_m(rays[blade.left]),
             edges=tuple(edge_of(edges[k], factor) for k in order),
             tip=tip_of(found.ending, factor) if found.ending is not None else None,
             heading=direction,
@@ -221,10 +225,6 @@ def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now |
         if geometry.bayer is not None and image.ndim == 2:
             image = demosaiced(image, geometry.bayer)
     return observe_photograph(image, now=now)
-
-
-def _without(matches: Matches, others: Matches) -> Matches:
-    return matches.take(~np.isin(matches.left, others.left))
 
 
 def _station_near(dots: Array, axis: float) -> Array:

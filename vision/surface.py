@@ -45,6 +45,11 @@ class Surface:
         result: Array = _terms(rays) @ self.coefficients
         return result
 
+    def nearest_m(self, rays: Array) -> float:
+        """Distance from the lens to the nearest place of the surface on rays (n, 3) with x = 1, those of its dots: the
+        nearest of the dots' own places would be the one with the largest error."""
+        return float((np.linalg.norm(rays, axis=1) / self.inverse_depth(rays)).min())
+
 
 def _terms(rays: Array) -> Array:
     """1, y, z, y², yz, z² (n, 6) of rays (n, 3)."""

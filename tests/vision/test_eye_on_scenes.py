@@ -78,6 +78,8 @@ def test_no_match_is_wrong_at_any_baseline_and_distance(baseline_m: float, dista
         assert wrong == 0
         assert right >= 0.95 * len(scene.truth.dots(side))
         assert rms < 0.25
+    nearest = np.linalg.norm(scene.truth.points[scene.truth.on_blade], axis=1).min()
+    assert observation.nearest_m == pytest.approx(nearest, rel=0.005)
 
 
 @pytest.mark.parametrize("brightness", [25.0, 60.0, 120.0, 180.0, 235.0])
