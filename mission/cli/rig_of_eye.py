@@ -1,4 +1,4 @@
-"""What the eye needs of a rig file: cameras and laser; whatever else it says does not matter here."""
+"""What the eye needs of a rig file: cameras and laser; what else it says about flying does not matter here."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ def geometry_of(path: Path) -> RigGeometry:
     Raises: CommandError, MissionFileError: with the file, the line and what would be right.
     """
     from mission.executive.belief import rig_geometry
+    from mission.language.diagnostics import Diagnostic, near_or_choices
     from mission.language.document import MissionFileError
     from mission.language.rig_file import RigFile
     from mission.language.sources import Sources
@@ -30,8 +31,13 @@ def geometry_of(path: Path) -> RigGeometry:
     if table is None:
         raise MissionFileError(sources.problems)
     entries = {key: entry for key, entry in table.entries.items() if key in ("camera", "camchain", "laser", "bayer")}
+    known = [*RigFile.model_fields, "world"]
+    for key, entry in table.entries.items():
+        if key not in known:
+            hint = near_or_choices(key, known)
+            sources.problems.append(Diagnostic(entry.key, "M202", f"rig has no {key!r}", hint))
     parts = typed(_seeing(), Table(entries, table.location, table.size), table.location, "rig", sources.problems)
-    if parts is None:
+    if parts is None or sources.problems:
         raise MissionFileError(sources.problems)
     if parts.camera is None and parts.camchain is None:
         raise CommandError(

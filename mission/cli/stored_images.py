@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mission.cli.errors import CommandError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from vision.camera import RigGeometry
     from vision.capture import Image
 
@@ -38,6 +44,29 @@ def found_images(source: Path) -> dict[str, Path]:
 def read_image(path: Path) -> Image:
     """An image (h, w) or (h, w, 3) BGR of 8 bits, as the camera took it: deeper ones are brought to 8 bits, alpha is
     left out, a grey image stored in colour is grey."""
+    image = _stored(path)
+    return _of_eight_bits(image, _bits(image))
+
+
+def read_images(found: dict[str, Path]) -> dict[str, Image]:
+    """The images of one observation: all in colour, or all grey where one of them is; deeper ones are brought to 8
+    bits, all alike."""
+    import cv2
+    import numpy as np
+
+    stored = {name: _stored(path) for name, path in found.items()}
+    bits = max(_bits(image) for image in stored.values())
+    images = {name: _of_eight_bits(image, bits) for name, image in stored.items()}
+    if any(image.ndim == 2 for image in images.values()):
+        images = {
+            name: image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+            for name, image in images.items()
+        }
+    return images
+
+
+def _stored(path: Path) -> NDArray[Any]:
+    """An image (h, w) or (h, w, 3) BGR of 8 or 16 bits as it lies in the file."""
     import cv2
     import numpy as np
 
@@ -48,35 +77,51 @@ def read_image(path: Path) -> Image:
         raise CommandError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     if data is None:
         raise CommandError(f"{path}: {size >> 20} MB is too large for an image; give one frame of a camera")
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what it says of a broken file is said below
     try:
-        flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
-        image = cv2.imdecode(data, flags) if len(data) else None
+        flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+        with _muted():
+            image = cv2.imdecode(data, flags) if len(data) else None
     except cv2.error:
         image = None
     if image is None:
         raise CommandError(f"{path}: not an image that can be read (PNG, JPEG, TIFF or BMP)")
+    if image.dtype not in (np.uint8, np.uint16):
+        raise CommandError(f"{path}: its pixels are {image.dtype}; 8 or 16 bits are read")
     if min(image.shape[:2]) < LEAST_SIDE:
         raise CommandError(
             f"{path}: {image.shape[1]} × {image.shape[0]} pixels are too few; give the camera's own picture"
         )
     if image.ndim == 3 and all(np.array_equal(image[..., 0], image[..., k]) for k in (1, 2)):
         image = image[..., 0]
-    return np.ascontiguousarray(image, np.uint8)
+    return np.ascontiguousarray(image)
 
 
-def read_images(found: dict[str, Path]) -> dict[str, Image]:
-    """The images of one observation: all in colour, or all grey where one of them is."""
-    import cv2
+@contextmanager
+def _muted() -> Iterator[None]:
+    """Nothing is written to standard error: what libraries say of a broken file there is said by an error of ours."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with Path(os.devnull).open("w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+def _bits(image: NDArray[Any]) -> int:
+    """8, or of how many bits a camera filled the lower part of 16: 10, 12, 14 or all."""
+    if image.dtype.itemsize == 1:
+        return 8
+    return next((bits for bits in (10, 12, 14) if int(image.max()) < 1 << bits), 16)
+
+
+def _of_eight_bits(image: NDArray[Any], bits: int) -> Image:
     import numpy as np
 
-    images = {name: read_image(path) for name, path in found.items()}
-    if any(image.ndim == 2 for image in images.values()):
-        images = {
-            name: image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
-            for name, image in images.items()
-        }
-    return images
+    deep = image.dtype.itemsize == 2
+    return np.ascontiguousarray(image >> (max(bits, 10) - 8) if deep else image, np.uint8)
 
 
 def check_sizes(found: dict[str, Path], images: dict[str, Image], geometry: RigGeometry | None) -> None:

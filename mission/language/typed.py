@@ -43,6 +43,8 @@ def _finding(model: type[BaseModel], root: Table, place: Location, what: str, de
         # Steps that pydantic adds for unions are no keys; the place is the nearest mapping around.
         outer, location = descend(root, path[:-1])
         location = place if outer is root else location
+        if isinstance(path[-1], int):
+            return Diagnostic(location, "M203", f"{_inside(what, path[:-1])} has {path[-1]} values, too few")
         return Diagnostic(location, "M201", f"{_inside(what, path[:-1])} needs {path[-1]!r}{_meaning(model, path)}")
     node, location = descend(root, path)
     used = f"; used at {node.used_at}" if isinstance(node, Scalar) and node.used_at else ""

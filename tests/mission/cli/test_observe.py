@@ -154,7 +154,7 @@ def test_the_same_images_tell_the_same_bit_for_bit(folder: Path, capsys: pytest.
         assert one == two
 
 
-@pytest.mark.parametrize("kind", ["grey", "grey_in_colour", "alpha", "deep", "jpeg", "one_is_grey"])
+@pytest.mark.parametrize("kind", ["grey", "grey_in_colour", "alpha", "deep", "twelve_bits", "jpeg", "one_is_grey"])
 def test_images_may_be_stored_in_any_usual_way(
     folder: Path, tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -167,6 +167,7 @@ def test_images_may_be_stored_in_any_usual_way(
             "grey_in_colour": cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR),
             "alpha": cv2.cvtColor(image, cv2.COLOR_BGR2BGRA),
             "deep": image.astype(np.uint16) * 257,
+            "twelve_bits": image.astype(np.uint16) * 16,
             "jpeg": image,
             "one_is_grey": grey if name == "right" else image,
         }[kind]
@@ -214,6 +215,10 @@ def test_a_wall_of_one_grey_is_refused_in_words_with_all_keys(
         ("left.png", "fisheye.yaml", "fisheye_chain.yaml:6: distortion_model of cam0: 'fov' is not known"),
         ("left.png", "nothing.yaml", "nothing.yaml"),
         ("left.png", "typing.yaml", "typing.yaml:2:.*fan"),
+        ("left.png", "short.yaml", "short.yaml:2:.*position_m has 2 values, too few"),
+        ("left.png", "twice.yaml", "twice.yaml:3:.*'laser' is already given at line 2"),
+        ("left.png", "lazer.yaml", "lazer.yaml:2:.*no 'lazer' .*did you mean laser"),
+        ("left.png", "metres.yaml", "metres.yaml:2:.*position_m.1: must be less than or equal to 5, not 100"),
     ],
 )
 def test_what_is_wrong_is_one_clear_line(folder: Path, images: str, rig: str | None, says: str) -> None:
@@ -223,6 +228,10 @@ def test_what_is_wrong_is_one_clear_line(folder: Path, images: str, rig: str | N
     (folder / "fisheye.yaml").write_text("camchain: fisheye_chain.yaml\n")
     (folder / "fisheye_chain.yaml").write_text(CAMCHAIN.replace("radtan", "fov"))
     (folder / "typing.yaml").write_text(RIG.replace("28.2", "wide"))
+    (folder / "short.yaml").write_text(RIG.replace("0.10, -0.06", "0.10"))
+    (folder / "twice.yaml").write_text(RIG + RIG.splitlines()[1])
+    (folder / "lazer.yaml").write_text(RIG.replace("laser:", "lazer:"))
+    (folder / "metres.yaml").write_text(RIG.replace("0.10", "100"))
     (folder / "hollow.png").write_bytes(b"")
     (folder / "empty").mkdir(exist_ok=True)
     (folder / "mixed").mkdir(exist_ok=True)
@@ -236,8 +245,10 @@ def test_what_is_wrong_is_one_clear_line(folder: Path, images: str, rig: str | N
 
 
 def test_the_program_ends_with_2_and_one_line_where_it_cannot_look(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "torn.png").write_bytes((folder / "left_laser.png").read_bytes()[:9000])
     for arguments in (
         [str(tmp_path / "none")],
+        [str(tmp_path / "torn.png")],
         [str(folder), "--annotate", str(tmp_path / "gone" / "seen.png")],
         [str(folder), "--annotate", str(tmp_path / "seen.doc")],
         [str(folder), "--rig", str(tmp_path / "none.yaml")],
