@@ -83,23 +83,6 @@ def shares_agreeing(t: Floats, agrees: Flags, low: Floats, high: Floats, fewest:
 
 
 @compiled
-def highest(values: Floats, but: int) -> Floats:
-    """The highest (k,) of values (k, n), `but` so many of them left out."""
-    most, found = np.empty(but + 1), np.empty(len(values))
-    for row in range(len(values)):
-        for k in range(values.shape[1]):
-            value = values[row, k]
-            if k <= but or value > most[but]:
-                place = min(k, but)
-                while place > 0 and most[place - 1] < value:
-                    most[place] = most[place - 1]
-                    place -= 1
-                most[place] = value
-        found[row] = most[but]
-    return found
-
-
-@compiled
 def _dense(agrees: Flags, window: int, dense: Flags) -> None:
     """Whether more than half of the `window` places about each place agree."""
     places = len(agrees)

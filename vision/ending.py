@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.beside_kernels import highest
 from vision.candidates import Candidate
 from vision.capture import Image
-from vision.ending_kernels import fittest, likeliest, seen_along, summits_over
+from vision.ending_kernels import fittest, likeliest, seen_along
 from vision.evidence import Blade
 from vision.lane_kernels import seen_in_lanes, steps_in_lanes
 from vision.lines import visible_stretch
+from vision.outline_kernels import dots_in_lanes, holes_over, summits_needed, told_until
 
 Array = NDArray[Any]  # of floats
 
@@ -31,6 +31,7 @@ CLOSED, OPEN = 1.4, -1.6  # the same where a lane ends
 CLEAR = 5.0  # evidence by which a blade that ends must be likelier than one that goes on
 LEAST_SHARE = 0.5  # of the lanes that close
 HOLE = -2.5  # of a missing dot inside the outline
+DOT_AHEAD_PX = 4.0  # px: so near a lane a dot is its own, and it does not end before it by more
 DOT_ROOM = 3.0  # px: a dot's centre may lie so far beyond the outline
 RIVAL = 25.0  # evidence within which the shapes are told apart by how well they fit
 APART_PX = 4.0  # so far apart lanes tell different things
@@ -76,12 +77,6 @@ class Side:
     def at(self, station: Array | float) -> Array:
         """Offset across the axis at stations."""
         return np.asarray(self.offset + self.slope * np.asarray(station, float))
-
-    def until(self, station: Array) -> Array:
-        """What speaks for an edge that goes on to stations and no further."""
-        if len(self.stations) == 0:
-            return np.zeros_like(station)
-        return np.asarray(self.sums[np.searchsorted(self.stations, station)])
 
 
 def side_of(edge: Candidate, toward: Array) -> Side:
@@ -146,7 +141,6 @@ def fit_ending(
     if wide < NARROWEST or low.most + high.most + CLOSED * wide * LONGEST_OUTLINE / CORRELATED_PX <= least_evidence:
         return None
     across = np.array([-toward[1], toward[0]])
-    aside = blade.dots @ across
     start, stop = visible_stretch(across[None], np.array([middle]), centre - 2)
     sign = 1.0 if np.array([-across[1], across[0]]) @ toward > 0 else -1.0
     border = float((stop if sign > 0 else -start)[0])
@@ -157,13 +151,11 @@ def fit_ending(
         return None
     skew = blade.skew(last_dot * toward + middle * across, toward)
     # A lane may not end before the dots it carries.
-    share_of = (aside - low.at(along)) / np.maximum(high.at(along) - low.at(along), 1.0)
-    along = along - skew * (share_of - 0.5) * wide
-    beside = np.abs(share_of[:, None] - SHARES) * wide < 4.0
-    quiet = np.where(beside, along[:, None], -np.inf).max(axis=0) - 4.0
+    lower, upper = (np.array([side.offset, side.slope]) for side in sides)
+    share_of, quiet = np.empty(len(along)), np.empty(LANES)
+    dots_in_lanes(blade.dots, toward, lower, upper, wide, skew, SHARES, DOT_AHEAD_PX, share_of, along, quiet)
     weakest = max(3.0, 1.5 * noise, 0.9 * blade.texture)
     size, seen = np.empty((2, LANES, len(s)))
-    lower, upper = (np.array([side.offset, side.slope]) for side in sides)
     boxes = (BOX, LONG_BOX)
     found = None
     for least in sorted({max(weakest, 0.2 * usual), weakest}, reverse=True):
@@ -190,20 +182,19 @@ def _best(
     skew: float,
 ) -> Ending | None:
     low, high = sides
-    across = np.array([-toward[1], toward[0]])
-    reach = LENGTHS * wide
+    lower, upper = (np.array([side.offset, side.slope]) for side in sides)
+    reach, start = LENGTHS * wide, float(s[0])
     # Dots that the outline has to hold, and missing ones that it should not.
     strays = int(blade.strays * len(along) + 0.9) if len(along) >= 20 else 0
-    needed = highest(_summits_over(along, share_of, reach), strays) - DOT_ROOM
-    gone, aside = blade.absent @ toward, blade.absent @ across
-    share_gone = (aside - low.at(gone)) / np.maximum(high.at(gone) - low.at(gone), 1.0)
-    between = (share_gone > 0.08) & (share_gone < 0.92)
-    gone, share_gone = (gone - skew * (share_gone - 0.5) * wide)[between], share_gone[between]
-    holes = _summits_over(gone, share_gone, reach) + DOT_ROOM
+    needed, holes = np.empty(len(reach)), np.empty((len(reach), len(blade.absent)))
+    summits_needed(along, share_of, DEPTHS, FIRST_SHARE, reach, strays, needed)
+    gone = holes_over(blade.absent, toward, lower, upper, wide, skew, DEPTHS, FIRST_SHARE, reach, holes)
     hole = HOLE if blade.grid_known else HOLE / 2
     shift = np.rint(DEPTHS * reach[:, None] / STEP).astype(np.int64)
     lead = int(shift.max()) + 1
-    ahead = s[0] + STEP * np.arange(-lead, len(s))
+    until = np.zeros(len(s) + lead)
+    for side in sides:
+        told_until(side.stations, side.sums, start - STEP * lead, STEP, until)
     count = len(LENGTHS)
     places, evidences, closing = np.empty(count, np.int64), np.empty(count), np.empty(count)
     likeliest(
@@ -212,10 +203,10 @@ def _best(
         np.rint(reach / STEP).astype(np.int64),
         PRIORS,
         wide * OUTLINES / CORRELATED_PX,  # independent places along each outline
-        np.ceil((needed - s[0]) / STEP).astype(np.int64),
-        (holes - s[0]) / STEP,
-        low.until(ahead) + high.until(ahead),
-        int((border - BORDER - s[0]) / STEP),
+        np.ceil((needed - DOT_ROOM - start) / STEP).astype(np.int64),
+        (holes[:, :gone] + DOT_ROOM - start) / STEP,
+        until,
+        int((border - BORDER - start) / STEP),
         CLOSED,
         OPEN,
         hole,
@@ -227,21 +218,13 @@ def _best(
     best = float(evidences.max())
     if not np.isfinite(best):
         return None
-    end = np.array([border + 1e3])
-    goes_on = float((low.until(end) + high.until(end))[0]) + hole * len(gone)
+    goes_on = float(low.sums[-1] + high.sums[-1]) + hole * gone
     least, tells = best - RIVAL, min(1.0, wide / LANES / APART_PX)
     k, station, sigma, evidence = fittest(
-        size, seen, shift, DEPTHS, reach, places, evidences, least, LEAST_LANES, UNREFINED_PX, float(s[0]), STEP, tells
+        size, seen, shift, DEPTHS, reach, places, evidences, least, LEAST_LANES, UNREFINED_PX, start, STEP, tells
     )
     lane_share = float(SHARES[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
     lane = float(low.at(station) + lane_share * (high.at(station) - low.at(station)))
     outermost = station + skew * (lane_share - 0.5) * wide
     shoulder = float(s[places[k]] - reach[k])
     return Ending(toward, outermost, lane, shoulder, float(closing[k]), sigma, evidence, goes_on)
-
-
-def _summits_over(along: Array, shares: Array, reach: Array) -> Array:
-    """Where the outermost point of each shape (k, n) has to be for it to pass through n points."""
-    summits = np.empty((len(reach), len(along)))
-    summits_over(along, shares, DEPTHS, FIRST_SHARE, reach, summits)
-    return summits

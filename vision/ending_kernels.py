@@ -89,23 +89,6 @@ def likeliest(
 
 
 @compiled
-def summits_over(
-    along: Floats, shares: Floats, depths: Floats, first_share: float, reach: Floats, summits: Floats
-) -> None:
-    """Where the outermost point (k, n) of k outlines has to be for them to pass through each of n points.
-
-    along (n,): stations; shares (n,): of the way from side to side. depths (k, lanes): how far the outlines fall behind
-    their outermost point in lanes from first_share to 1 - first_share, in reaches (k,)."""
-    last = depths.shape[1] - 1
-    for j in range(len(along)):
-        place = min(max((shares[j] - first_share) / (1.0 - 2.0 * first_share), 0.0), 1.0) * last
-        lane = min(int(place), last - 1)
-        part = place - lane
-        for k in range(len(reach)):
-            summits[k, j] = along[j] + reach[k] * (depths[k, lane] * (1.0 - part) + depths[k, lane + 1] * part)
-
-
-@compiled
 def _median(values: Floats) -> Any:
     """Median of a few values; they are put in order."""
     count = len(values)
