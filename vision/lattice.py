@@ -179,20 +179,21 @@ def _turned(steps: Array) -> tuple[Array, Array, Indices]:
 
 
 def _held(uv: Array, at: dict[Place, int]) -> dict[Place, int]:
-    """Those with at least two neighbours, one of them in a line of three evenly spaced dots or at a corner of a
-    square."""
+    """Those with at least two neighbours, or one and two more at their corners, and a neighbour in a line of three
+    evenly spaced dots."""
     while True:
         kept = {}
         for (r, c), spot in at.items():
             here = uv[spot]
             count = even = 0
+            corners = sum((r + dr, c + dc) in at for dr in (-1, 1) for dc in (-1, 1))
             for dr, dc in ROUND_ABOUT:
                 one, two = at.get((r + dr, c + dc)), at.get((r + 2 * dr, c + 2 * dc))
                 count += one is not None
                 if one is not None and two is not None:
                     bend = uv[two] - 2 * uv[one] + here
                     even += bool(np.hypot(*bend) < 0.3 * np.hypot(*(uv[one] - here)))
-            if count >= 2 and even >= 1:
+            if (count >= 2 or (count == 1 and corners >= 2)) and even >= 1:
                 kept[r, c] = spot
         if len(kept) == len(at):
             return kept
