@@ -50,20 +50,30 @@ def likeliest(
     lead = len(until) - count
     best = -np.inf
     uncovered = np.zeros(count + 1, np.int64)  # holes that lie inside from each place on
-    share, total, gain = np.empty(count), np.empty(count), (closed - open_) / lanes
+    share, total, value = np.empty(count), np.empty(count), np.empty(count)
+    inside, gain, stop = np.empty(count), (closed - open_) / lanes, min(count, last + 1)
     for k in range(len(reach)):
         uncovered[:] = 0
         for h in range(holes.shape[1]):
             uncovered[int(min(max(np.floor(holes[k, h]) + 1, 0), count))] += 1
         evidence[k], places[k], shares[k] = -np.inf, -1, 0.0
         # what speaks for each place but for its lanes, and whether these could make it the best
-        inside, low, high = 0, count, 0
-        for place in range(min(count, last + 1)):
-            inside += uncovered[place]
-            at_shoulder = min(max(place - reach[k] + lead, 0), len(until) - 1)
-            total[place] = base[k] + until[at_shoulder] + hole * inside
-            if place >= first[k] and total[place] + weight[k] * closed > best - near:
-                low, high = min(low, place), place + 1
+        so_far = 0
+        for place in range(stop):
+            so_far += uncovered[place]
+            inside[place] = so_far
+        ahead = lead - reach[k]
+        before, own, farther = min(max(-ahead, 0), stop), base[k], until[max(ahead, 0) :]
+        for place in range(before):
+            total[place] = own + until[0] + hole * inside[place]
+        later, inside_later = total[before:], inside[before:]
+        for m in range(stop - before):
+            later[m] = own + farther[m] + hole * inside_later[m]
+        low, high, most = max(first[k], 0), stop, weight[k] * closed
+        while low < high and not total[low] + most > best - near:
+            low += 1
+        while high > low and not total[high - 1] + most > best - near:
+            high -= 1
         if high <= low:
             continue
         share[low:high] = 0.0
@@ -81,10 +91,10 @@ def likeliest(
             for place in range(start, high):
                 share[place] += row[place - back]
         for place in range(low, high):
-            seen_here = share[place] / lanes
-            value = total[place] + weight[k] * (open_ + (closed - open_) * seen_here)
-            if value > evidence[k] and total[place] + weight[k] * closed > best - near:
-                evidence[k], places[k], shares[k] = value, place, seen_here
+            value[place] = total[place] + weight[k] * (open_ + (closed - open_) * (share[place] / lanes))
+        for place in range(low, high):
+            if value[place] > evidence[k] and total[place] + most > best - near:
+                evidence[k], places[k], shares[k] = value[place], place, share[place] / lanes
         best = max(best, evidence[k])
 
 

@@ -16,23 +16,31 @@ Flags = NDArray[np.bool_]
 
 @compiled
 def _sampled(
-    image: Floats, height: int, width: int, channels: int, count: int, room: Floats, at: NDArray[np.int64], tone: Floats
+    image: Floats,
+    height: int,
+    width: int,
+    channels: int,
+    count: int,
+    room: Floats,
+    at: NDArray[np.uint64],
+    tone: Floats,
 ) -> None:
     """Bilinear values, written to tone (c, count), of an image (h, w, c), flat, at pixels u, v in room (2, count); the
     border continues outward. What is in room is lost, and at (count,) is to reckon in: row beside row, for vectors."""
     across, down, below = room[0], room[1], width * channels
     last_u, last_v = width - 1.0, height - 1.0
+    beside, under_it = np.uint64(channels), np.uint64(below)  # an index that may be negative is asked whether it is
     for i in range(count):
         u, v = min(max(across[i], 0.0), last_u), min(max(down[i], 0.0), last_v)
         left, top = min(np.floor(u), last_u - 1.0), min(np.floor(v), last_v - 1.0)
         across[i], down[i] = u - left, v - top
-        at[i] = int(top * width + left) * channels
+        at[i] = np.uint64(int(top * width + left) * channels)
     for c in range(channels):
         values = tone[c]
         for i in range(count):
-            k = at[i] + c
-            over = image[k] * (1.0 - across[i]) + image[k + channels] * across[i]
-            under = image[k + below] * (1.0 - across[i]) + image[k + below + channels] * across[i]
+            k = at[i] + np.uint64(c)
+            over = image[k] * (1.0 - across[i]) + image[k + beside] * across[i]
+            under = image[k + under_it] * (1.0 - across[i]) + image[k + under_it + beside] * across[i]
             values[i] = over * (1.0 - down[i]) + under * down[i]
 
 
@@ -44,7 +52,7 @@ def steps_between(image: Image, points: Floats, least: float, most: float, share
     height, width, channels = image.shape
     count = len(shares)
     flat, tone = image.reshape(-1), np.empty((channels, count))
-    room, corner = np.empty((2, count)), np.empty(count, np.int64)
+    room, corner = np.empty((2, count)), np.empty(count, np.uint64)
     change, found = np.empty(len(points) * len(points)), 0
     for a in range(len(points)):
         for b in range(a + 1, len(points)):
@@ -79,7 +87,7 @@ def shares_at_depth(
     lines, places = near.shape[:2]
     height, width, channels = image.shape
     flat, tone = image.reshape(-1), np.empty((channels, samples))
-    room, corner = np.empty((2, samples)), np.empty(samples, np.int64)
+    room, corner = np.empty((2, samples)), np.empty(samples, np.uint64)
     raw = np.empty((places, samples - 2))
     for line in range(lines):
         shares[line] = np.nan
@@ -139,7 +147,7 @@ def steps_in_lanes(
     centre_u, centre_v = (width - 1) / 2, (height - 1) / 2
     wide = count + 2 * long
     flat, tone, sums = image.reshape(-1), np.empty((channels, wide)), np.empty((channels, wide + 1))
-    room, corner = np.empty((2, wide)), np.empty(wide, np.int64)
+    room, corner = np.empty((2, wide)), np.empty(wide, np.uint64)
     brief, lasting, inside = np.empty(count), np.empty(count), np.empty(count)
     for lane in range(lanes):
         share = shares[lane]
@@ -212,7 +220,7 @@ def steps_before(
     lines, count, inner = change.shape
     height, width, channels = image.shape
     flat, tone = image.reshape(-1), np.empty((channels, inner + 2))
-    room, corner = np.empty((2, inner + 2)), np.empty(inner + 2, np.int64)
+    room, corner = np.empty((2, inner + 2)), np.empty(inner + 2, np.uint64)
     centre_u, centre_v = (width - 1) / 2, (height - 1) / 2
     for line in range(lines):
         nx, ny = normals[line, 0], normals[line, 1]

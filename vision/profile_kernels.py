@@ -25,23 +25,31 @@ AGREES_PX = 1.5  # from the curve, at which a step is no part of the line
 
 @compiled
 def _sampled(
-    image: Floats, height: int, width: int, channels: int, count: int, room: Floats, at: NDArray[np.int64], tone: Floats
+    image: Floats,
+    height: int,
+    width: int,
+    channels: int,
+    count: int,
+    room: Floats,
+    at: NDArray[np.uint64],
+    tone: Floats,
 ) -> None:
     """Bilinear values, written to tone (c, count), of an image (h, w, c), flat, at pixels u, v in room (2, count); the
     border continues outward. What is in room is lost, and at (count,) is to reckon in: row beside row, for vectors."""
     across, down, below = room[0], room[1], width * channels
     last_u, last_v = width - 1.0, height - 1.0
+    beside, under_it = np.uint64(channels), np.uint64(below)  # an index that may be negative is asked whether it is
     for i in range(count):
         u, v = min(max(across[i], 0.0), last_u), min(max(down[i], 0.0), last_v)
         left, top = min(np.floor(u), last_u - 1.0), min(np.floor(v), last_v - 1.0)
         across[i], down[i] = u - left, v - top
-        at[i] = int(top * width + left) * channels
+        at[i] = np.uint64(int(top * width + left) * channels)
     for c in range(channels):
         values = tone[c]
         for i in range(count):
-            k = at[i] + c
-            over = image[k] * (1.0 - across[i]) + image[k + channels] * across[i]
-            under = image[k + below] * (1.0 - across[i]) + image[k + below + channels] * across[i]
+            k = at[i] + np.uint64(c)
+            over = image[k] * (1.0 - across[i]) + image[k + beside] * across[i]
+            under = image[k + under_it] * (1.0 - across[i]) + image[k + under_it + beside] * across[i]
             values[i] = over * (1.0 - down[i]) + under * down[i]
 
 
@@ -117,9 +125,10 @@ def refine(
     lines, samples = t.shape
     height, width, channels = smooth.shape
     flat, wide = smooth.reshape(-1), 2 * reach + 1
-    room, corner = np.empty((2, wide + 2)), np.empty(wide + 2, np.int64)
+    per_place, count = wide + 2, samples * (wide + 2)
+    room, corner = np.empty((2, count)), np.empty(count, np.uint64)
     centre_u, centre_v = (width - 1) / 2, (height - 1) / 2
-    tone = np.empty((channels, wide + 2))
+    tone = np.empty((channels, count))
     raw, size = np.empty((samples, wide)), np.empty(wide)
     place, near, vote = np.empty(samples), np.empty(samples), np.empty(samples)
     info = np.empty(6)
@@ -130,17 +139,20 @@ def refine(
             at = start + (end - start) * (m / (samples - 1))
             t[line, m], place[m] = at, at - focuses[line]
             u, v = rho * nx - at * ny + centre_u, rho * ny + at * nx + centre_v
-            for i in range(wide + 2):
+            across_u, down_v = room[0, m * per_place :], room[1, m * per_place :]
+            for i in range(per_place):
                 across = i - reach - 1
-                room[0, i], room[1, i] = u + across * nx, v + across * ny
-            _sampled(flat, height, width, channels, wide + 2, room, corner, tone)
+                across_u[i], down_v[i] = u + across * nx, v + across * ny
+        _sampled(flat, height, width, channels, count, room, corner, tone)
+        for m in range(samples):
+            row, values = raw[m], tone[0, m * per_place :]
             for i in range(wide):
-                change = tone[0, i + 2] - tone[0, i]
-                for c in range(1, channels):
-                    other = tone[c, i + 2] - tone[c, i]
-                    if abs(other) > abs(change):
-                        change = other
-                raw[m, i] = change
+                row[i] = values[i + 2] - values[i]
+            for c in range(1, channels):
+                values = tone[c, m * per_place :]
+                for i in range(wide):
+                    other = values[i + 2] - values[i]
+                    row[i] = other if abs(other) > abs(row[i]) else row[i]
         for m in range(samples):
             before, after = max(m - 1, 0), min(m + 1, samples - 1)
             best = 1

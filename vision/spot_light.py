@@ -118,13 +118,27 @@ def _differences(
         for k in range(size - 2 * side):
             across, down = ahead[k] - behind[k], below[k] - over[k]
             inner[k] = quarter * (across * across + down * down)
-        for i in range(side):  # the border has no neighbours outside
-            for row, column in ((0, i), (side - 1, i), (i, 0), (i, side - 1)):
-                a, b = max(row - 1, 0) * side + column, min(row + 1, side - 1) * side + column
-                c, d = row * side + max(column - 1, 0), row * side + min(column + 1, side - 1)
-                steep[row * side + column] = quarter * ((flat[d] - flat[c]) ** 2 + (flat[b] - flat[a]) ** 2)
+        _border_slopes(flat, side, steep)
         variances[n, 0] = about / (size - 6)
         variances[n, 1] = _border_roughness(light, side)
+
+
+@compiled
+def _border_slopes(flat: Floats, side: int, steep: Floats) -> None:
+    """The squared gradient along the border of a square, which has no neighbours outside."""
+    last, quarter = side * side - side, np.float32(0.25)
+    for i in range(side):
+        before, after = max(i - 1, 0), min(i + 1, side - 1)
+        top, low = flat[after] - flat[before], flat[last + after] - flat[last + before]
+        in_top, in_low = flat[side + i] - flat[i], flat[last + i] - flat[last - side + i]
+        steep[i] = quarter * (top * top + in_top * in_top)
+        steep[last + i] = quarter * (low * low + in_low * in_low)
+    for i in range(1, side - 1):
+        k, m = i * side, i * side + side - 1
+        left, right = flat[k + side] - flat[k - side], flat[m + side] - flat[m - side]
+        in_left, in_right = flat[k + 1] - flat[k], flat[m] - flat[m - 1]
+        steep[k] = quarter * (in_left * in_left + left * left)
+        steep[m] = quarter * (in_right * in_right + right * right)
 
 
 @compiled
@@ -137,8 +151,12 @@ def _square(
     if left >= 0 and top >= 0 and left + side <= width and top + side <= height:
         for i in range(side):
             start, to = ((top + i) * width + left) * channels + channel, i * side
-            for k in range(side):
-                values[to + k] = image[start + channels * k]
+            if channels == 1:  # a loop of its own, whose stride is known
+                for k in range(side):
+                    values[to + k] = image[start + k]
+            else:
+                for k in range(side):
+                    values[to + k] = image[start + channels * k]
         return
     for i in range(side):
         start, to = min(max(top + i, 0), height - 1) * width, i * side
