@@ -1,4 +1,4 @@
-"""Stereo calibration from a chessboard seen by both cameras, and how far the result may be trusted.
+"""Stereo calibration from a chessboard seen by both cameras (Zhang 2000), and how far the result may be trusted.
 
 Few views, or views that are hardly tilted, leave focal length and distance to trade places: the fit looks good and is
 wrong. Then the focal lengths are held at the lens's nominal one instead of being fitted, and the result says so.
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.board import BoardViews
-from vision.calibration_doubts import WANTED_VIEWS, conditions_of, doubts_of
+from vision.calibration_doubts import WANTED_VIEWS, conditions_of, doubts_of, doubts_of_pair
 from vision.calibration_fit import CELLS, CalibrationError, CameraFit, Nominal, View
-from vision.calibration_pairs import between, epipolar_error, fits_badly
+from vision.calibration_pairs import between, epipolar_error
 from vision.camchain import stereo_of_opencv
 from vision.camera import Camera, StereoPair
 
@@ -133,6 +133,12 @@ def calibrate_stereo(views: BoardViews, nominal: Nominal | None = None, choice: 
     doubts = doubts_of(free[0], free[1], nominal)
     chosen: Literal["free", "held"] = "held" if choice == "held" or (choice == "auto" and doubts and held) else "free"
     left, right = held if chosen == "held" and held is not None else free
+    for name, fit in zip(EYES, (left, right), strict=True):
+        if fit.rms_px > HOPELESS * fit.camera.width:
+            raise CalibrationError(
+                f"the corners in the {name} images miss those of the board by {fit.rms_px:.0f} px: "
+                "are they listed in the order of the board's?"
+            )
     both = [k for k in seen[0] if k in seen[1]]
     if not both:
         raise CalibrationError("no view shows the board to both cameras")
@@ -151,7 +157,7 @@ def calibrate_stereo(views: BoardViews, nominal: Nominal | None = None, choice: 
     warnings = [
         *doubts,
         *conditions_of(free[0], free[1], doubted=bool(doubts)),
-        *_doubts_of_pair(stereo, rms, alone, views.square_m, square, nominal),
+        *doubts_of_pair(stereo, rms, alone, views.square_m, square, nominal),
     ]
     if doubts:
         kept = f"the focal length is held at the nominal {nominal.focal_px:.0f} px" if chosen == "held" else ""
@@ -186,27 +192,6 @@ def _fitting(views: BoardViews, side: Mapping[int, Array]) -> tuple[CameraFit, s
         if not rough or len(kept) - len(rough) < max(FEWEST_VIEWS, 2 / 3 * len(side)):
             return fit, bad
         bad |= rough
-
-
-def _doubts_of_pair(
-    stereo: StereoPair, rms: float, alone: float, given_m: float | None, square_m: float, nominal: Nominal
-) -> list[str]:
-    """Why the motion between the cameras may not be trusted, in plain words."""
-    doubts = []
-    if fits_badly(rms, alone):
-        doubts.append(f"the two cameras do not fit together: {rms:.2f} px, where each alone has {alone:.2f} px")
-    if stereo.translation[1] > 0.5 * stereo.baseline_m:
-        doubts.append("the right camera comes out to the left of the left one: are the pictures swapped?")
-    if given_m is None:
-        doubts.append(
-            "the square's size is not given; the nominal baseline, itself not measured, "
-            f"makes it {square_m * 1e3:.1f} mm"
-        )
-    elif nominal.baseline_m is not None and abs(stereo.baseline_m / nominal.baseline_m - 1) > 0.05:
-        doubts.append(
-            f"the baseline comes out as {stereo.baseline_m * 1000:.1f} mm, nominal {nominal.baseline_m * 1000:.1f} mm"
-        )
-    return doubts
 
 
 def _listed(

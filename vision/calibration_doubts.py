@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vision.calibration_fit import CameraFit, Nominal
+from vision.calibration_pairs import fits_badly
+from vision.camera import StereoPair
 
 WANTED_VIEWS = 10
 WANTED_TILT = np.deg2rad(15)  # spread of the board's tilt among the views
@@ -43,3 +45,24 @@ def conditions_of(left: CameraFit, right: CameraFit, *, doubted: bool) -> list[s
     if share < WANTED_COVERAGE:
         lacks.append(f"the corners cover {share:.0%} of the image only: bring the board into every corner of it")
     return lacks
+
+
+def doubts_of_pair(
+    stereo: StereoPair, rms: float, alone: float, given_m: float | None, square_m: float, nominal: Nominal
+) -> list[str]:
+    """Why the motion between the cameras may not be trusted, in plain words."""
+    doubts = []
+    if fits_badly(rms, alone):
+        doubts.append(f"the two cameras do not fit together: {rms:.2f} px, where each alone has {alone:.2f} px")
+    if stereo.translation[1] > 0.5 * stereo.baseline_m:
+        doubts.append("the right camera comes out to the left of the left one: are the pictures swapped?")
+    if given_m is None:
+        doubts.append(
+            "the square's size is not given; the nominal baseline, itself not measured, "
+            f"makes it {square_m * 1e3:.1f} mm"
+        )
+    elif nominal.baseline_m is not None and abs(stereo.baseline_m / nominal.baseline_m - 1) > 0.05:
+        doubts.append(
+            f"the baseline comes out as {stereo.baseline_m * 1000:.1f} mm, nominal {nominal.baseline_m * 1000:.1f} mm"
+        )
+    return doubts

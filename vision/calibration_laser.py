@@ -129,7 +129,8 @@ def on_plane(wall: WallDots, stereo: StereoPair, number: int = 0) -> tuple[Array
 
 
 def triangulated(left: Array, right: Array, stereo: StereoPair) -> Array:
-    """Points (n, 3) m in the left camera's frame nearest to pairs of rays (n, 3) of both eyes."""
+    """Points (n, 3) m in the left camera's frame midway between pairs of rays (n, 3) of both eyes, where they pass each
+    other nearest (the thesis's triangulation, without its assumption of parallel cameras)."""
     turned = right @ stereo.rotation  # right rays in the left camera's axes
     lens = -stereo.rotation.T @ stereo.translation
     a, b, c = (left * left).sum(1), (left * turned).sum(1), (turned * turned).sum(1)

@@ -50,7 +50,7 @@ def fits_badly(rms_px: float, alone_px: float) -> bool:
 
 def epipolar_error(stereo: StereoPair, pairs: Sequence[Pair]) -> float:
     """Root mean square distance (px of the right image without distortion) of points from their partners' epipolar
-    lines."""
+    lines, those of the essential matrix [t]× R (Longuet-Higgins 1981)."""
     t = stereo.translation
     cross = np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
     essential = cross @ stereo.rotation

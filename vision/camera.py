@@ -22,7 +22,7 @@ Lens = Literal["radtan", "equidistant"]
 @dataclass(frozen=True)
 class Camera:
     """A pinhole camera whose lens bends as OpenCV and Kalibr have it. lens: radtan, the radial-tangential distortion
-    (k1, k2, p1, p2), or equidistant, that of fisheye lenses (k1, k2, k3, k4; Kannala and Brandt 2006)."""
+    (k1, k2, p1, p2; Brown 1966), or equidistant, that of fisheye lenses (k1, k2, k3, k4; Kannala and Brandt 2006)."""
 
     width: int
     height: int

@@ -126,8 +126,8 @@ def _laser(source: Path, camchain: Path | None, rows: int, columns: int, fan_deg
     import numpy as np
 
     from devices.camchain_file import read_camchain
-    from mission.cli.calibration_files import read_walls
     from mission.cli.errors import CommandError
+    from mission.cli.wall_files import read_walls
     from vision.calibration_laser import fit_laser
     from vision.calibration_report import laser_text
     from vision.camera import LaserGrid
@@ -137,7 +137,7 @@ def _laser(source: Path, camchain: Path | None, rows: int, columns: int, fan_deg
     stereo = read_camchain(camchain)
     fan = float(np.deg2rad(fan_deg))
     nominal = LaserGrid(rows, columns, (fan, fan))
-    text = laser_text(fit_laser(read_walls(source, nominal), stereo, nominal))
+    text = laser_text(fit_laser(read_walls(source, nominal, stereo), stereo, nominal))
     if report is not None:
         report.mkdir(parents=True, exist_ok=True)
         (report / "laser.txt").write_text(text, "utf-8")

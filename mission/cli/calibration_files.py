@@ -1,4 +1,4 @@
-"""Boards and walls as a person stores them: lists of corners or dots in JSON, or folders of pictures."""
+"""Boards as a person stores them: lists of corners in JSON, or folders of pictures."""
 
 from __future__ import annotations
 
@@ -16,24 +16,21 @@ from mission.cli.stored_images import ENDINGS, read_image
 if TYPE_CHECKING:
     from vision.board import BoardViews
     from vision.calibration_fit import Nominal
-    from vision.calibration_laser import WallDots
-    from vision.camera import LaserGrid
-    from vision.capture import Image
-    from vision.observation import Dots
 
 T = TypeVar("T", bound=BaseModel)
 
 LARGEST_FILE = 64 * 1024 * 1024
 
 Point = tuple[float, float]
-Count = Annotated[int, Field(ge=0, le=1000)]
 
 
-class _File(BaseModel):
+class File(BaseModel):
+    """A file of JSON; keys that it has besides do not matter."""
+
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
 
-class DataSheet(_File):
+class DataSheet(File):
     """What the lens and the rig were sold as."""
 
     focal_length_mm: float | None = Field(None, gt=0.1, le=2000)
@@ -41,7 +38,7 @@ class DataSheet(_File):
     baseline_mm: float | None = Field(None, gt=1, le=5000)
 
 
-class CornerFile(_File):
+class CornerFile(File):
     """Corners of one board: for each view the same corners in the same order, null where a camera did not see the
     board."""
 
@@ -53,24 +50,11 @@ class CornerFile(_File):
     nominal: DataSheet = DataSheet()
 
 
-class Wall(_File):
-    """Dots on one wall: row, column, u, v of each, in both eyes."""
-
-    left: list[tuple[Count, Count, float, float]]
-    right: list[tuple[Count, Count, float, float]]
-
-
-class WallFile(_File):
-    """Walls at several distances."""
-
-    walls: list[Wall] = Field(min_length=1)
-
-
 def read_corners(path: Path) -> tuple[BoardViews, DataSheet]:
     """Corners from a JSON file, with the data sheet that it carries."""
     from vision.board import BoardViews
 
-    file = _validated(CornerFile, path)
+    file = validated(CornerFile, path)
     count = len(file.object_points)
     if len(file.left) != len(file.right):
         raise CommandError(f"{path}: left has {len(file.left)} views and right {len(file.right)}; both need the same")
@@ -78,6 +62,13 @@ def read_corners(path: Path) -> tuple[BoardViews, DataSheet]:
         for number, view in enumerate(getattr(file, side)):
             if view is not None and len(view) != count:
                 raise CommandError(f"{path}: {side}[{number}] has {len(view)} corners, object_points has {count}")
+            width, height = file.image_size
+            for u, v in view or ():
+                if not (-1 <= u <= width and -1 <= v <= height):
+                    raise CommandError(
+                        f"{path}: {side}[{number}] has a corner at ({u:g}, {v:g}), outside an image_size of "
+                        f"{width} x {height}"
+                    )
     square = None if file.square_mm is None else file.square_mm / 1000
     sides = [tuple(None if view is None else np.array(view) for view in side) for side in (file.left, file.right)]
     return BoardViews(file.image_size, np.array(file.object_points), sides[0], sides[1], square), file.nominal
@@ -126,15 +117,6 @@ def find_boards(folder: Path, board: str) -> tuple[BoardViews, list[str]]:
     return views, unused
 
 
-def read_walls(source: Path, laser: LaserGrid) -> list[WallDots]:
-    """Dots from a JSON file, or from a folder with one folder of pictures a wall: left_laser and right_laser, and, for
-    dots on a patterned wall, left and right beside them."""
-    if source.is_dir():
-        return _seen_walls(source, laser)
-    walls = _validated(WallFile, source).walls
-    return [_common(wall.left, wall.right, laser, f"{source}: walls[{number}]") for number, wall in enumerate(walls)]
-
-
 def nominal_of(sheet: DataSheet, focal_mm: float | None, pixel_um: float | None, baseline_mm: float | None) -> Nominal:
     """The data sheet with what the command line says instead."""
     from vision.calibration_fit import Nominal
@@ -147,7 +129,8 @@ def nominal_of(sheet: DataSheet, focal_mm: float | None, pixel_um: float | None,
     return Nominal(focal_px, None if baseline is None else baseline / 1000)
 
 
-def _validated(model: type[T], path: Path) -> T:
+def validated(model: type[T], path: Path) -> T:
+    """What a JSON file says; raises CommandError with the first thing in it that is wrong."""
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise CommandError(f"{path}: too large")
@@ -189,62 +172,3 @@ def _pairs(folder: Path) -> tuple[dict[str, tuple[Path, Path]], list[str]]:
         if name not in partners
     ]
     return {name: (left[name], right[name]) for name in both}, alone
-
-
-def _seen_walls(folder: Path, laser: LaserGrid) -> list[WallDots]:
-    walls = []
-    for place in sorted(path for path in folder.iterdir() if path.is_dir()):
-        sides = []
-        for side in ("left", "right"):
-            dots = _whole_grid(place, side, laser)
-            sides.append(list(zip(dots.row.tolist(), dots.column.tolist(), *dots.uv.T.tolist(), strict=True)))
-        walls.append(_common(sides[0], sides[1], laser, str(place)))
-    if not walls:
-        raise CommandError(f"{folder}: no folders of walls in it, one with left_laser.png and right_laser.png each")
-    return walls
-
-
-def _whole_grid(place: Path, side: str, laser: LaserGrid) -> Dots:
-    """The laser's dots on a wall: all rows and columns must be in view, for nothing else numbers them."""
-    from vision.single import grid_of
-
-    lit = _named(place, f"{side}_laser")
-    if lit is None:
-        raise CommandError(f"{place}: {side}_laser.png is missing; a wall needs left_laser and right_laser")
-    dark = _named(place, side)
-    if dark is not None:
-        if dark.shape != lit.shape:
-            raise CommandError(f"{place}: {side}.png and {side}_laser.png differ in size or colour")
-        lit = np.asarray(np.clip(lit.astype(np.int16) - dark + 20, 0, 255), np.uint8)
-    dots = grid_of(lit)
-    seen = (0, 0) if dots is None else (int(dots.row.max()) + 1, int(dots.column.max()) + 1)
-    if dots is None or seen != (laser.rows, laser.columns):
-        raise CommandError(
-            f"{place}: {side}_laser.png shows {seen[0]} rows and {seen[1]} columns of dots, the laser has {laser.rows} "
-            f"and {laser.columns}; the whole grid must be in view (--rows, --columns say how large it is)"
-        )
-    return dots
-
-
-def _named(place: Path, name: str) -> Image | None:
-    path = next((place / f"{name}{end}" for end in ENDINGS if (place / f"{name}{end}").exists()), None)
-    return None if path is None else read_image(path)
-
-
-def _common(
-    left: list[tuple[int, int, float, float]],
-    right: list[tuple[int, int, float, float]],
-    laser: LaserGrid,
-    what: str,
-) -> WallDots:
-    """The dots of one wall that both eyes saw."""
-    from vision.calibration_laser import WallDots
-
-    one, other = ({(row, column): (u, v) for row, column, u, v in dots} for dots in (left, right))
-    both = sorted(set(one) & set(other))
-    beyond = next((dot for dot in both if dot[0] >= laser.rows or dot[1] >= laser.columns), None)
-    if beyond is not None:
-        raise CommandError(f"{what}: dot {beyond} lies outside a grid of {laser.rows} rows and {laser.columns} columns")
-    index = np.array(both, np.int64).reshape(-1, 2)
-    pixels = (np.array([side[dot] for dot in both], float).reshape(-1, 2) for side in (one, other))
-    return WallDots(index[:, 0], index[:, 1], *pixels)

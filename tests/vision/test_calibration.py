@@ -131,6 +131,13 @@ def test_cameras_that_never_looked_at_the_same_board_are_refused() -> None:
         calibrate_stereo(replace(views, right=views.right[3:] + views.right[:3]))
 
 
+def test_corners_in_another_order_than_the_boards_are_refused() -> None:
+    views = board_views(35, 6, np.random.default_rng(1))
+    order = np.random.default_rng(0).permutation(54)
+    with pytest.raises(CalibrationError, match="right images miss those of the board"):
+        calibrate_stereo(replace(views, right=tuple(view[order] for view in views.right)))
+
+
 def test_swapped_cameras_are_noticed() -> None:
     views = board_views(35, 12, np.random.default_rng(1))
     fit = calibrate_stereo(replace(views, left=views.right, right=views.left))

@@ -160,6 +160,7 @@ def test_pictures_without_the_board_are_refused(tmp_path: Path, capsys: pytest.C
     [
         ({"left": [[[1, 2]]]}, "12"),
         ({"image_size": [0, 10]}, "image_size.0"),
+        ({"image_size": [600, 500]}, "outside an image_size of 600 x 500"),
         ({"object_points": "none"}, "object_points"),
         ({"square_mm": None}, "baseline"),
         ({"left": [None] * 12}, "at least 3"),

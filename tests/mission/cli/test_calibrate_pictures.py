@@ -124,3 +124,7 @@ def test_pictures_of_walls_give_the_laser_back(tmp_path: Path) -> None:
     wrong = ran(tmp_path / "walls", *given[:-1], 12)
     assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1
     assert "shows 9 rows and 11 columns of dots" in wrong.stderr
+    smaller = StereoPair(LEFT.shrunk(2), RIGHT.shrunk(2), STEREO.rotation, STEREO.translation)
+    write_camchain(tmp_path / "camchain.yaml", smaller)
+    other = ran(tmp_path / "walls", *given)
+    assert other.returncode == 2 and "800 x 640 px, the camchain's camera 400 x 320" in other.stderr
