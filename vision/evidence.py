@@ -193,14 +193,9 @@ def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], nois
     rays = stereo.left.rays((points + stereo.left.centre).reshape(-1, 2))
     inverse = np.clip((1 - rays[:, 1:] @ surface.slope) / surface.depth_m, 0.02, 1.5)
 
-    def seen_at(depth: Array) -> Array:
-        """Pixels (lines, places, 2) of the right eye, for points at depths along the left eye's rays."""
-        return stereo.right.project((rays * depth[:, None]) @ stereo.rotation.T + stereo.translation).reshape(
-            lines, places, 2
-        )
-
-    there, deeper = seen_at(1 / inverse), seen_at(1 / inverse + ROUND_M)
-    far = stereo.right.project(rays @ stereo.rotation.T).reshape(lines, places, 2)
+    depth, turned = (1 / inverse)[:, None], rays @ stereo.rotation.T
+    seen = np.stack((turned * depth + stereo.translation, turned * (depth + ROUND_M) + stereo.translation, turned))
+    there, deeper, far = stereo.right.project(seen).reshape(3, lines, places, 2)
     share = np.empty(lines)
     shares_at_depth(
         other.smooth, there, deeper, far, profile.normal, profile.step, profile.agrees, beside, PARALLAX_PX,

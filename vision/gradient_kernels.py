@@ -21,13 +21,15 @@ LEVEL, LEVELS = 9, 5441  # strengths that are counted as one, and how many such 
 @compiled
 def median_roughness(tones: Image) -> float:
     """Median over the image (h, w, c) of what a pixel's first tone differs from its two neighbours, taken twice."""
-    height, width = tones.shape[0], tones.shape[1]
+    height, width, channels = tones.shape
+    step = width * channels
     count = np.zeros(1021, np.int64)
-    total = 0
+    total, flat = 0, tones.reshape(-1)
     for y in range(1, height, 4):
-        for x in range(1, width - 1, 7):
-            rough = 2 * np.int64(tones[y, x, 0]) - tones[y, x - 1, 0] - tones[y, x + 1, 0]
-            count[abs(rough)] += 1
+        before, here, after = flat[y * step :], flat[y * step + channels :], flat[y * step + 2 * channels :]
+        for x in range(0, (width - 2) * channels, 7 * channels):
+            rough = 2 * np.int32(here[x]) - np.int32(before[x]) - np.int32(after[x])
+            count[np.uint32(abs(rough))] += 1
             total += 1
     seen, lower = 0, -1
     for level in range(len(count)):

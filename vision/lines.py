@@ -31,7 +31,7 @@ MARGIN = 3.0  # px along the image border in which no steps are sought
 def sensor_noise(tones: Image) -> float:
     """Standard deviation of the noise in grey levels, from what neighbours do not share in the quiet half of the
     image."""
-    return max(0.6, 1.4826 * float(median_roughness(tones)) / float(np.sqrt(6.0)))
+    return max(0.6, 1.4826 * float(median_roughness(np.ascontiguousarray(tones))) / float(np.sqrt(6.0)))
 
 
 def smoothed(tones: Image, room: Image | None = None) -> Image:

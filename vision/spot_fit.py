@@ -47,11 +47,12 @@ def _solve(matrix: Floats, right: Floats, count: int, factored: bool) -> None:
 
 @compiled
 def _equations(
-    pixels: Floats, side: int, spot: Floats, shape: Floats, full: bool, sums: Floats, normal: Floats, right: Floats
-) -> tuple[float, float]:
+    pixels: Floats, side: int, spot: Floats, shape: Floats, falls: Floats, full: bool, sums: Floats, normal: Floats,
+    right: Floats,
+) -> tuple[float, float]:  # fmt: skip
     """Normal equations of the residual about a spot (u, v, level, base) in terms of base and the bell times (1, x, y,
     x², xy, y²), in this order, x and y from the spot's centre, the last three only if `full`; returned: weighted
-    squares of residuals, their number.
+    squares of residuals, their number. falls (3,): exp(-shape).
 
     pixels (side, 3 · WIDE): signal, weights, and 1 where burnt, weightless from column `side` on. sums (17 · WIDE,):
     float32, room for sums down each column, which are taken side by side and only then put together."""
@@ -66,11 +67,11 @@ def _equations(
         np.exp(-0.5 * (pxx * x + 2 * pxy * y) * x - 0.5 * pyy * y * y),
         np.exp(-0.5 * pyy * (2 * y + 1) - pxy * x),
     )
-    across, change, turn = np.exp(-0.5 * pxx * (2 * x + 1) - pxy * y), np.exp(-pxx), np.exp(-pxy)
+    across, change, turn = np.exp(-0.5 * pxx * (2 * x + 1) - pxy * y), falls[0], falls[1]
     for k in range(side):
         sums[k], sums[WIDE + k] = bell, down
         bell, across, down = bell * across, across * change, down * turn
-    fall = np.float32(np.exp(-pyy))
+    fall = np.float32(falls[2])
     for i in range(side):
         y = np.float32(i - reach - v)
         row = pixels[i]
@@ -159,6 +160,7 @@ def fit_spots(
     unless free_shape. found (n, 4): u, v from the middle, level, base; holds the start. Written besides: shapes (n, 3),
     quality (n, 4) = variances of u, of v, of the level, mean of weighted squared residuals."""
     count, size = signal.shape
+    falls = np.exp(-usual)
     bound = int(np.sqrt(size) + 0.5) // 2 - 0.5
     unknowns = 7 if free_shape else 4
     side = int(np.sqrt(size) + 0.5)
@@ -176,7 +178,10 @@ def fit_spots(
                 line[2 * WIDE + k] = lost[k]
         misfit, number, scale = 0.0, 0.0, 1.0
         for _ in range(steps):
-            misfit, number = _equations(square, side, spot, shape, free_shape, sums, normal, right)
+            if free_shape:
+                for i in range(3):
+                    falls[i] = np.exp(-shape[i])
+            misfit, number = _equations(square, side, spot, shape, falls, free_shape, sums, normal, right)
             for i in range(unknowns):
                 normal[i, i] += 1e-3 * normal[i, i] + 1e-9
             _solve(normal, right, unknowns, False)
