@@ -67,7 +67,7 @@ class BladeObservation:
 
     valid: whether distance and edges may be used at all; `reasons` says why not, in plain words.
     dots_left, dots_right: what was found. matches (n, 2): rows and columns of the grid that both eyes saw.
-    points (n, 3) m in the camera frame and sigma_m (n,) along the viewing ray, on the blade alone.
+    points (n, 3) m in the camera frame and sigma_m (n,) of their depth x, on the blade alone.
     plane: unit normal (3,) toward the camera and the point (3,) m at which the optical axis meets the surface.
     plane_covariance (3, 3): of (depth at the optical axis m, d depth / d y, d depth / d z).
     distance_m: depth of the surface along the optical axis. nearest_m: least distance from the lens to the surface
