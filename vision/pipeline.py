@@ -110,7 +110,7 @@ class Eye:
         if 0 < np.count_nonzero(~surface.inliers) < LEAST_OTHER:
             matches = matches.take(~np.isin(matches.left, blade.left[~surface.inliers]))
         blade = blade.take(surface.inliers)
-        doubt = rig_doubt(left, right, rays, matches, blade, laser)
+        doubt = rig_doubt(rays[blade.left], blade, laser) if right is not None else None
         if doubt is not None:
             return self._refused(frames, watch, doubt)
         watch.lap("surface")
