@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vision.candidates import LEAST_SUPPORT, Candidate, weigh
 from vision.capture import Image
 from vision.closing import contradicted, evidence_of, find_closed, goes_on, opposite, unexplained, with_partner
+from vision.continued import continues
 from vision.edge_fit import lens_bend, settled, trimmed
 from vision.ending import Ending
 from vision.evidence import Blade, OtherEye
@@ -66,7 +67,7 @@ def find_edges(
     typical = typical_edge(there)
     believed = [c for c in there if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))]
     clear = [c for c in believed if not _faint_behind_gaps(c, blade)]
-    chosen = _choose([c for c in clear if not _hides_nothing(c, candidates, blade)], blade, largest)
+    clear, chosen = _chosen(clear, candidates, smooth, blade, other, noise, largest)
     if len(chosen) == 1:
         chosen = with_partner(chosen[0], clear, blade, largest)
     ending = None
@@ -92,6 +93,27 @@ def find_edges(
     directions = np.array([np.arctan2(c.outward[1], c.outward[0]) + np.pi / 2 for c in chosen])
     axis = 0.5 * np.angle(np.exp(2j * directions).sum()) % np.pi
     return Found(chosen, float(axis), ending, ())
+
+
+def _chosen(
+    clear: list[Candidate],
+    candidates: list[Candidate],
+    smooth: Image,
+    blade: Blade,
+    other: OtherEye | None,
+    noise: float,
+    largest: float,
+) -> tuple[list[Candidate], tuple[Candidate, ...]]:
+    """The candidates beyond which the blade does not go on, as far as that was asked, and the chosen ones of them."""
+    asked: list[Candidate] = []
+    while True:
+        chosen = _choose([c for c in clear if not _hides_nothing(c, candidates, blade)], blade, largest)
+        new = [c for c in chosen if c.beyond == 0 and not any(c is one for one in asked)]
+        if other is None or not new:
+            return clear, chosen
+        asked += new
+        on_blade = [c for c in new if continues(c, smooth, other, noise)]
+        clear = [c for c in clear if not any(c is one for one in on_blade)]
 
 
 def _bend_at_focus(edge: Candidate, blade: Blade) -> float:
