@@ -84,7 +84,7 @@ def shape_of(silhouette: Silhouette) -> Shape | None:
         for two in sides[a + 1 :]
         if float(-one.outward @ two.outward) > np.cos(LARGEST_AT_END) and _width(one, two) > 0
     ]
-    for one, two in sorted(pairs, key=lambda pair: -pair[0].length - pair[1].length):
+    for one, two in sorted(pairs, key=_likely, reverse=True):
         end = _end(silhouette, runs, (one, two))
         if end is not None:
             return Shape((_behind(one, sides, end.toward), _behind(two, sides, end.toward)), end)
@@ -97,6 +97,11 @@ def shape_of(silhouette: Silhouette) -> Shape | None:
     if any(run.length * OUTWEIGHS > longest.length for run in others):
         return None
     return Shape((longest,))
+
+
+def _likely(pair: tuple[Run, Run]) -> float:
+    """How much speaks for a pair: long edges, and nearly parallel ones, as sides of a tip lean more than edges."""
+    return (pair[0].length + pair[1].length) * float(-pair[0].outward @ pair[1].outward) ** 2
 
 
 def _end(silhouette: Silhouette, runs: list[Run], edges: tuple[Run, Run]) -> End | None:

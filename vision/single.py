@@ -127,7 +127,7 @@ def _too_few(grid: DotGrid | None) -> str:
     if grid is None:
         return "the image is too small to hold dots in a grid"
     count = 0 if grid.lattice is None else len(grid.lattice)
-    return f"{len(grid.spots)} bright spots, {count} of them in a grid"
+    return f"too few laser dots in a grid: {count} of {len(grid.spots)} bright spots, {LEAST_DOTS} are needed"
 
 
 def _outline(clean: Image, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_], middle: Array) -> Found:
