@@ -75,7 +75,8 @@ class BladeObservation:
     edges: none, one or two, first the one whose outward normal lies to the left of the axis direction `heading`.
     heading: direction of the blade's axis in the image, radians modulo π. chord_m: between the two edges where both
     are seen.
-    sharpness: 0 (blurred) to 1. exposure: mean grey of the blade, 0 to 255.
+    sharpness: 0 (blurred, or no edge to judge by) to 1. exposure: mean grey of the blade, 0 to 255; of the whole image
+    where no blade was found.
     """
 
     stamp_s: float

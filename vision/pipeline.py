@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +18,7 @@ from vision.lines import smoothed
 from vision.mosaic import demosaiced
 from vision.observation import BladeObservation, Dots
 from vision.peaks import Reach
-from vision.quality import exposure, sharpness
+from vision.quality import brightness, exposure, ill_lit, sharpness
 from vision.reduction import half_green_and_tones, reduce_image, reduction_factor, to_full
 from vision.rig_doubt import rig_doubt
 from vision.single import observe_photograph
@@ -207,8 +205,10 @@ class Eye:
             )
 
     def _refused(self, frames: StereoFrames, watch: Stopwatch, *reasons: str) -> BladeObservation:
+        grey = brightness(frames.left_laser) if frames.left_laser is not None else 0.0
         watch.lap("rest")
-        return replace(BladeObservation(frames.stamp_s, False, reasons), elapsed_ms=watch.elapsed_ms)
+        why = (*reasons, *ill_lit(grey))
+        return BladeObservation(frames.stamp_s, False, why, exposure=grey, elapsed_ms=watch.elapsed_ms)
 
 
 def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now | None = None) -> BladeObservation:

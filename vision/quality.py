@@ -15,6 +15,7 @@ Array = NDArray[Any]  # of floats
 
 ACROSS, ENDS = 15, 4  # samples across a step, one px apart, and how many at either end tell its height
 LEAST_RISE = 2.0  # grey levels
+DARKEST, BRIGHTEST = 12.0, 245.0  # mean grey beyond which hardly anything can be told
 SHARPEST = 0.55  # of a step's height, gained within one pixel of a sharp image at working size
 
 
@@ -25,6 +26,18 @@ def exposure(image: Image, pixels: Array) -> float:
     last = np.array(image.shape[1::-1]) - 1
     at = np.minimum(np.maximum(np.rint(pixels), 0), last).astype(int)
     return float(image[at[:, 1], at[:, 0]].mean())
+
+
+def brightness(image: Image) -> float:
+    """Mean grey of a whole image (h, w) or (h, w, c) of bytes, 0 to 255, by every eighth row and column."""
+    return float(image[::8, ::8].mean()) if image.size else 0.0
+
+
+def ill_lit(grey: float) -> tuple[str, ...]:
+    """What is wrong with an image of so bright a mean, in words, where that is why nothing is found in it."""
+    if grey < DARKEST:
+        return (f"the image is dark: its mean grey is {grey:.0f} of 255",)
+    return (f"the image is overexposed: its mean grey is {grey:.0f} of 255",) if grey > BRIGHTEST else ()
 
 
 def sharpness(image: Image, edges: tuple[Candidate, ...]) -> float:

@@ -179,6 +179,18 @@ def test_without_laser_light_it_refuses_and_says_what_it_saw() -> None:
     dark = replace(scene.frames, left_laser=scene.frames.left, right_laser=scene.frames.right)
     observation = Eye(scene.geometry).observe(dark)
     assert not observation.valid and "spots" in observation.reasons[0] and observation.distance_m is None
+    assert len(observation.reasons) == 1
+    assert observation.exposure == pytest.approx(float(scene.frames.left.mean()), abs=3)
+
+
+@pytest.mark.parametrize(("grey", "says"), [(0.0, "dark"), (6.0, "dark"), (255.0, "overexposed")])
+def test_of_an_image_that_is_dark_or_overexposed_it_says_so(grey: float, says: str) -> None:
+    scene = draw_scene(PLAIN)
+    image = np.full_like(scene.frames.left_laser, grey)
+    frames = replace(scene.frames, left=image, right=image, left_laser=image, right_laser=image)
+    observation = Eye(scene.geometry).observe(frames)
+    assert not observation.valid and says in observation.reasons[-1]
+    assert observation.exposure == grey
 
 
 def test_a_missing_image_is_a_refusal_and_a_wrong_size_an_error() -> None:
