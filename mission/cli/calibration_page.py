@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
+import math
 from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vision.calibration import StereoFit
-    from vision.calibration_fit import CameraFit
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1c2530; max-width: 62rem; margin: 2rem auto; padding: 0 1rem }
@@ -20,13 +20,18 @@ pre { background: #f4f6f8; padding: 1rem; overflow-x: auto; font-size: 13px }
 figure { margin: 0 } figcaption { color: #5a6672; font-size: 13px } img { max-width: 100% }
 .bars { display: flex; gap: 2rem; flex-wrap: wrap }
 """
-WIDE, HIGH, BASE = 420, 150, 120
+WIDE, HIGH, BASE = 300, 130, 120
 
 
 def page(fit: StereoFit, text: str, coverage_png: bytes) -> str:
     """The page's HTML. text: the report in words. coverage_png: the picture of where corners were."""
     picture = base64.b64encode(coverage_png).decode()
-    bars = "".join(_bars(name, camera) for name, camera in (("left", fit.left), ("right", fit.right)))
+    errors = {
+        "left camera": {view.name: view.left_px for view in fit.views},
+        "right camera": {view.name: view.right_px for view in fit.views},
+        "both held together": {view.name: view.together_px for view in fit.views},
+    }
+    bars = "".join(_bars(name, by_view) for name, by_view in errors.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Calibration</title><style>{STYLE}</style></head><body>
 <h1>Calibration of the stereo cameras</h1>
@@ -50,19 +55,20 @@ def _warnings(fit: StereoFit) -> str:
     return f'<div class="warnings"><b>Read before use</b><ul>{items}</ul></div>'
 
 
-def _bars(name: str, camera: CameraFit) -> str:
-    """Root mean square error of each view, as bars on the scale of the worst one."""
-    errors = camera.view_rms_px.tolist()
-    largest = max([*errors, 1e-9])
-    step = WIDE / len(errors)
+def _bars(name: str, by_view: dict[str, float]) -> str:
+    """Root mean square error of each view in px, as bars on the scale of the worst one; NaN: no bar."""
+    counted = [error for error in by_view.values() if math.isfinite(error)]
+    largest = max([*counted, 1e-9])
+    step = WIDE / len(by_view)
     drawn = "".join(
         f'<rect x="{k * step + 1:.1f}" y="{BASE - 100 * error / largest:.1f}" width="{max(step - 2, 1):.1f}" '
-        f'height="{100 * error / largest:.1f}" fill="#3b6ea5"><title>view {k + 1}: {error:.3f} px</title></rect>'
-        for k, error in enumerate(errors)
+        f'height="{100 * error / largest:.1f}" fill="#3b6ea5"><title>{escape(view)}: {error:.3f} px</title></rect>'
+        for k, (view, error) in enumerate(by_view.items())
+        if math.isfinite(error)
     )
     return (
-        f'<figure><svg width="{WIDE}" height="{HIGH}" role="img" aria-label="{name} camera">'
+        f'<figure><svg width="{WIDE}" height="{HIGH}" role="img" aria-label="{name}">'
         f'<text x="0" y="12" font-size="12">{largest:.2f} px</text>{drawn}'
         f'<line x1="0" y1="{BASE}" x2="{WIDE}" y2="{BASE}" stroke="#1c2530"/></svg>'
-        f"<figcaption>{name} camera, {len(errors)} views, {camera.rms_px:.3f} px in all</figcaption></figure>"
+        f"<figcaption>{name}, {len(counted)} of {len(by_view)} views</figcaption></figure>"
     )
