@@ -148,8 +148,11 @@ def _weighed(
     start, stop = np.maximum(low, first), np.minimum(high, last)
     apart = stop - start < LEAST_RUN
     start, stop = np.where(apart, first, start), np.where(apart, last, stop)
-    before_run = blocked(profile, blade, smooth, steps, start, stop, noise)
-    gone, gone_on_run = missing(blade, profile, low, high), missing(blade, profile, start, stop)
+    gone = missing(blade, profile, low, high)
+    before_run, gone_on_run = before, gone
+    if (start != low).any() or (stop != high).any():
+        before_run = blocked(profile, blade, smooth, steps, start, stop, noise)
+        gone_on_run = missing(blade, profile, start, stop)
     known = (*told_by_dots, steps, shown, before, *gone, before_run, *gone_on_run, first, last, profile.rho)
     rows = np.stack(known).T.tolist()
     strongest = 1.0

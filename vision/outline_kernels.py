@@ -39,16 +39,12 @@ def dots_in_lanes(
 
 
 @compiled
-def _summit_over(along: float, share: float, depths: Floats, first_share: float, reach: float) -> float:
-    """Where the outermost point of an outline has to be for it to pass through a point at a station and a share of the
-    way from side to side. depths (lanes,): how far the outline falls behind its outermost point in lanes from
-    first_share to 1 - first_share, in reaches."""
-    last = len(depths) - 1
-    place = min(max((share - first_share) / (1.0 - 2.0 * first_share), 0.0), 1.0) * last
-    lane = min(int(place), last - 1)
-    part = place - lane
-    summit: float = along + reach * (depths[lane] * (1.0 - part) + depths[lane + 1] * part)
-    return summit
+def _place(share: float, lanes: int, first_share: float) -> tuple[int, float]:
+    """The last lane at or before a share of the way from side to side, of some lanes from first_share to 1 -
+    first_share, and how much of the way to the next one it is from there."""
+    place = min(max((share - first_share) / (1.0 - 2.0 * first_share), 0.0), 1.0) * (lanes - 1)
+    lane = min(int(place), lanes - 2)
+    return lane, place - lane
 
 
 @compiled
@@ -56,12 +52,16 @@ def summits_needed(
     along: Floats, shares: Floats, depths: Floats, first_share: float, reach: Floats, strays: int, needed: Floats
 ) -> None:
     """Where the outermost point of each of k outlines has to be at least (k,) to hold all but some strays of the dots
-    at stations along (n,) and shares (n,). depths (k, lanes) and reach (k,): as for `_summit_over`."""
-    most = np.empty(strays + 1)
+    at stations along (n,) and shares (n,) of the way from side to side. depths (k, lanes): how far the outlines fall
+    behind their outermost points in lanes from first_share to 1 - first_share, in reaches (k,)."""
+    most, lane, part = np.empty(strays + 1), np.empty(len(along), np.int64), np.empty(len(along))
+    for n in range(len(along)):
+        lane[n], part[n] = _place(shares[n], depths.shape[1], first_share)
     for k in range(len(reach)):
         most[:] = -np.inf
+        depth = depths[k]
         for n in range(len(along)):
-            summit = _summit_over(along[n], shares[n], depths[k], first_share, reach[k])
+            summit = along[n] + reach[k] * (depth[lane[n]] * (1.0 - part[n]) + depth[lane[n] + 1] * part[n])
             if summit > most[strays]:
                 place = strays
                 while place > 0 and most[place - 1] < summit:
@@ -88,8 +88,9 @@ def holes_over(
         if not 0.08 < share < 0.92:
             continue
         along = station - skew * (share - 0.5) * wide
+        lane, part = _place(share, depths.shape[1], first_share)
         for k in range(len(reach)):
-            holes[k, count] = _summit_over(along, share, depths[k], first_share, reach[k])
+            holes[k, count] = along + reach[k] * (depths[k, lane] * (1.0 - part) + depths[k, lane + 1] * part)
         count += 1
     return count
 
