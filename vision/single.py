@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.apart import on_two_surfaces
 from vision.bright_spots import without_laser
 from vision.candidates import Candidate, weigh
 from vision.capture import Image
@@ -16,6 +17,7 @@ from vision.dot_grid import DotGrid, find_dot_grid, resized
 from vision.edges import Found, edge_of, find_edges
 from vision.evidence import Blade, texture_between
 from vision.laser_fan import Fan, fan_of, middle_place
+from vision.lattice import Lattice
 from vision.lines import hough_lines, sensor_noise, smoothed
 from vision.observation import BladeObservation, Dots
 from vision.outlined import with_outline
@@ -62,6 +64,7 @@ def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = Non
     in_view = np.asarray((np.abs(places) < centre - BORDER_PX).all(axis=1), np.bool_)
     middle = middle_place(grid.spots.uv, lattice, (np.array(grid.image.shape[1::-1]) - 1) / 2)
     found = _outline(clean, dots, places, fan, in_view, middle)
+    found = _on_one_surface(found, clean, dots, lattice)
     watch.lap("edges")
     edges, axis, to_photograph = found.edges, found.axis, 1 / (factor * grid.scale)
     return BladeObservation(
@@ -151,6 +154,16 @@ def _outline(clean: Image, dots: Array, places: Array, fan: Fan, in_view: NDArra
         refused = refused or found
     assert refused is not None
     return _held_against_outline(refused, clean, smooth, dots, places, fan, in_view)
+
+
+def _on_one_surface(found: Found, clean: Image, dots: Array, lattice: Lattice) -> Found:
+    """What was found, or nothing where some of the dots (n, 2) lie on what is behind the blade: its edges then run
+    between them, and those found enclose both."""
+    noise = sensor_noise(clean)
+    lines = hough_lines(clean, noise, MOST_LINES)
+    if not found.edges or not on_two_surfaces(lines, dots, lattice, smoothed(clean), noise):
+        return found
+    return Found((), found.axis, None, ("no edge: the dots lie on two surfaces, one behind the other",))
 
 
 def _held_against_outline(
