@@ -13,6 +13,7 @@ from vision.surface_kernels import fit
 Array = NDArray[Any]  # of floats
 
 LARGEST_BEND = 0.06  # relative change of inverse depth from the plane through a blade's dots
+BENT_OTHERWISE = 0.2  # of a surface's bend, by which it is no parabola
 NOWHERE = 1e3  # 1/m, sigma of what does not count
 SLOPE, BEND = 0.35, 3.0  # of a blade's surface: relative change of inverse depth per image unit at focal length one
 SPREAD = np.array([1e3, SLOPE, SLOPE, BEND, BEND, BEND])  # of the terms, over the inverse depth
@@ -70,7 +71,8 @@ def fit_surface(rays: Array, inverse_depth: Array, sigma: Array) -> Surface | No
         return None
     rays, inverse_depth, sigma = (np.ascontiguousarray(values) for values in (rays, inverse_depth, sigma))
     coefficients, covariance, inliers = np.empty(6), np.empty((3, 3)), np.empty(len(rays), np.bool_)
-    bent = fit(rays, inverse_depth, sigma, SLOPE, SPREAD, LARGEST_BEND, NOWHERE, coefficients, covariance, inliers)
+    limits = LARGEST_BEND, BENT_OTHERWISE, NOWHERE
+    bent = fit(rays, inverse_depth, sigma, SLOPE, SPREAD, limits, coefficients, covariance, inliers)
     a, b, c = coefficients[:3].tolist()
     if a <= 0:
         return None

@@ -176,15 +176,16 @@ def robust(design: Array, values: Array, sigma: Array, held: Array, solution: Ar
 
 @compiled
 def fit(
-    rays: Array, inverse_depth: Array, sigma: Array, held_slope: float, spread: Array, largest_bend: float,
-    nowhere: float, coefficients: Array, covariance: Array, inliers: NDArray[np.bool_],
+    rays: Array, inverse_depth: Array, sigma: Array, held_slope: float, spread: Array,
+    limits: tuple[float, float, float], coefficients: Array, covariance: Array, inliers: NDArray[np.bool_],
 ) -> bool:  # fmt: skip
     """The surface through points at inverse depths (n,), known to sigma (n,), along rays (n, 3); whether it is bent.
 
     held_slope: of a blade's surface; spread (6,): of its terms, over the inverse depth; both as standard deviations.
-    largest_bend: relative change of inverse depth from the plane that most lie on, past which a point is elsewhere and
-    counts as one known to `nowhere`. Written: coefficients (6,) of inverse depth in terms of 1, y, z, y², yz, z²,
-    covariance (3, 3) of the first three, inliers (n,)."""
+    limits: relative change of inverse depth from the plane that most lie on, past which a point is elsewhere; share of
+    its bend by which a bent surface is no parabola; sigma of what counts for nothing. Written: coefficients (6,) of
+    inverse depth in terms of 1, y, z, y², yz, z², covariance (3, 3) of the first three, inliers (n,)."""
+    largest_bend, bent_otherwise, nowhere = limits
     count = len(rays)
     terms, relief, weight, values = np.empty((count, 6)), np.empty(count), np.empty(count), inverse_depth
     far, start = np.empty(count, np.bool_), np.empty(3)
@@ -196,13 +197,14 @@ def fit(
         relief[n] = np.sqrt(sigma[n] ** 2 + (0.002 * values[n]) ** 2)
     # A plane through a few neighbours is rough: what counts is to be on the same surface, not within the noise.
     consensus(terms, values, relief, 2 * held_slope, start)
-    near, reach = 0, np.inf
+    near, reach, nearest = 0, np.inf, 0
     for n in range(count):
         off = values[n] - (start[0] + start[1] * terms[n, 1] + start[2] * terms[n, 2])
         far[n] = abs(off) > 4 * relief[n] + largest_bend * values[n]
         near += not far[n]
         relief[n] = nowhere if far[n] else relief[n]  # what stands elsewhere pulls at nothing
-        reach = min(reach, np.sqrt(terms[n, 3] + terms[n, 5]))
+        if np.sqrt(terms[n, 3] + terms[n, 5]) < reach:
+            reach, nearest = np.sqrt(terms[n, 3] + terms[n, 5]), n
     # The little information that a surface's slope and bend are as small as they usually are.
     held, middle = np.empty(6), median(values)
     for i in range(6):
@@ -216,14 +218,14 @@ def fit(
         curved[:3] = start
         curved_cost = robust(terms, values, relief, held, curved, curved_weight)
         better = (flat_cost - curved_cost) / 3 / max(curved_cost / (near - 6), 1.0)
-        # A bend that is there and not modelled shows in the depth where the optical axis meets the surface.
-        unmodelled = abs(coefficients[0] - curved[0]) * min(max((better - 1) / 5, 0.0), 1.0)
+        # A bend that is not modelled shows at the optical axis; past the nearest dot a parabola is soon anywhere.
+        bend = (terms[nearest] * (coefficients - curved)).sum()
+        unmodelled = abs(bend) * min(max((better - 1) / 5, 0.0), 1.0)
         if better > 6 and reach < 0.08:
-            unmodelled, known, bent, weight = 0.0, 6, True, curved_weight
+            unmodelled, known, bent, weight = bent_otherwise * abs(bend), 6, True, curved_weight
             for i in range(6):
                 coefficients[i] = curved[i]
-    information, inverse = np.empty((known, known)), np.zeros((3, known))
-    information[:] = 0.0
+    information, inverse = np.zeros((known, known)), np.zeros((3, known))
     squares, inside = 0.0, 0
     for n in range(count):
         off = values[n]
@@ -243,8 +245,6 @@ def fit(
         factor[:] = information
         inverse[i, i] = 1.0
         solve(factor, inverse[i])
-        for j in range(3):
-            inverse[i, j] *= scale
-    inverse[0, 0] += unmodelled**2
-    covariance[:] = inverse[:, :3]
+    covariance[:] = scale * inverse[:, :3]
+    covariance[0, 0] += unmodelled**2
     return bent
