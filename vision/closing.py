@@ -112,7 +112,7 @@ def find_closed(
         ending = fit_ending(smooth, noise, sides, toward, blade, usual, least)
         if ending is None or ending.share < LEAST_SHARE or ending.evidence < ending.goes_on + CLEAR:
             continue
-        if ending.evidence > least:
+        if ending.evidence > max(least, -others):
             best = Closed(edges, ending, ending.evidence + others)
     return best
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from vision.candidates import Candidate
 from vision.capture import Image
-from vision.ending_kernels import fittest, likeliest, seen_along
+from vision.end_fit_kernels import fittest
+from vision.ending_kernels import likeliest, seen_along
 from vision.evidence import Blade
 from vision.lane_kernels import seen_in_lanes, steps_in_lanes
 from vision.lines import visible_stretch
@@ -30,16 +31,16 @@ SEEN, UNSEEN = 1.28, -2.0  # log of how much likelier an outline is to show a st
 CLOSED, OPEN = 1.4, -1.6  # the same where a lane ends
 CLEAR = 5.0  # evidence by which a blade that ends must be likelier than one that goes on
 LEAST_SHARE = 0.5  # of the lanes that close
-HOLE = -2.5  # of a missing dot inside the outline
+HOLE = -3.5  # of a missing dot inside the outline
+LEAST_GONE = 2  # missing dots beyond an end of a blade of which one edge is not seen
 DOT_AHEAD_PX = 4.0  # px: so near a lane a dot is its own, and it does not end before it by more
 DOT_ROOM = 3.0  # px: a dot's centre may lie so far beyond the outline
 RIVAL = 25.0  # evidence within which the shapes are told apart by how well they fit
-APART_PX = 4.0  # so far apart lanes tell different things
+APART_PX = 4.0  # so far apart lanes tell different things of the shape
 NARROWEST = 16.0  # px
 HIDDEN_PX = 9.0  # a step so far before the outline hides it
 SUMMITS = (0.0, -0.1, 0.1, -0.3, 0.3, -0.6, 0.6)  # of an outline, from the middle toward an edge
 LOPSIDED = -8.0  # evidence of an outline whose summit is all the way to one side
-LEAST_LANES, UNREFINED_PX = 6, 4.0  # that an outline is fitted to, and its standard deviation with fewer
 BORDER = 6.0  # px: an outline nearer to the image border than this is not seen to close
 SHARES = np.linspace(FIRST_SHARE, 1 - FIRST_SHARE, LANES)  # where lanes lie, 0 on the lower edge and 1 on the upper
 
@@ -56,7 +57,10 @@ def _shapes() -> tuple[Array, Array]:
 
 
 LENGTHS, DEPTHS = _shapes()
-OUTLINES = np.hypot(1.0, 2 * LENGTHS)  # length of each outline, in widths of the blade
+POINTED = DEPTHS.sum(axis=1) > 0.42 * LANES  # of the outlines, the spikes
+ARCS = np.hypot(1.0, LENGTHS[:, None] * np.gradient(DEPTHS, SHARES, axis=1))  # of each outline, in widths, by lanes
+OUTLINES = ARCS.mean(axis=1)  # length of each outline, in widths of the blade
+ARCS /= ARCS.sum(axis=1, keepdims=True)
 LONGEST_OUTLINE = float(OUTLINES.max())
 PRIORS = LOPSIDED * np.abs(2 * SHARES[DEPTHS.argmin(axis=1)] - 1) * (LENGTHS > 0)
 
@@ -154,15 +158,16 @@ def fit_ending(
     lower, upper = (np.array([side.offset, side.slope]) for side in sides)
     share_of, quiet = np.empty(len(along)), np.empty(LANES)
     dots_in_lanes(blade.dots, toward, lower, upper, wide, skew, SHARES, DOT_AHEAD_PX, share_of, along, quiet)
-    weakest = max(3.0, 1.5 * noise, 0.9 * blade.texture)
+    faintest = max(3.0, 1.5 * noise)
+    weakest = max(faintest, 0.9 * blade.texture)
     size, seen = np.empty((2, LANES, len(s)))
     boxes = (BOX, LONG_BOX)
     found = None
-    for least in sorted({max(weakest, 0.2 * usual), weakest}, reverse=True):
+    for least in sorted({max(weakest, 0.2 * usual), weakest, faintest}, reverse=True):
         steps_in_lanes(smooth, lower, upper, toward, skew * wide, SHARES, s, quiet, boxes, NO_STREAK, least, size)
         seen_in_lanes(size, least, int(HIDDEN_PX / STEP), SLACK, seen)
-        found = _best(s, seen, size, sides, toward, blade, share_of, along, border, wide, skew)
-        # Where dots tell that the blade ends, its end may show less than its edges do.
+        found = _best(s, seen, size, sides, toward, blade, share_of, along, border, wide, skew, least)
+        # Where dots tell that the blade ends, its end may show less than its edges and its own shade do.
         if found is None or found.share >= LEAST_SHARE or found.evidence < found.goes_on + CLEAR:
             break
     return found
@@ -180,6 +185,7 @@ def _best(
     border: float,
     wide: float,
     skew: float,
+    least_step: float,
 ) -> Ending | None:
     low, high = sides
     lower, upper = (np.array([side.offset, side.slope]) for side in sides)
@@ -189,6 +195,8 @@ def _best(
     needed, holes = np.empty(len(reach)), np.empty((len(reach), len(blade.absent)))
     summits_needed(along, share_of, DEPTHS, FIRST_SHARE, reach, strays, needed)
     gone = holes_over(blade.absent, toward, lower, upper, wide, skew, DEPTHS, FIRST_SHARE, reach, holes)
+    if gone < LEAST_GONE and not (len(low.stations) and len(high.stations)):
+        return None
     hole = HOLE if blade.grid_known else HOLE / 2
     shift = np.rint(DEPTHS * reach[:, None] / STEP).astype(np.int64)
     lead = int(shift.max()) + 1
@@ -197,34 +205,19 @@ def _best(
         told_until(side.stations, side.sums, start - STEP * lead, STEP, until)
     count = len(LENGTHS)
     places, evidences, closing = np.empty(count, np.int64), np.empty(count), np.empty(count)
+    weights = wide * OUTLINES / CORRELATED_PX  # independent places along each outline
     likeliest(
-        seen,
-        shift,
-        np.rint(reach / STEP).astype(np.int64),
-        PRIORS,
-        wide * OUTLINES / CORRELATED_PX,  # independent places along each outline
-        np.ceil((needed - DOT_ROOM - start) / STEP).astype(np.int64),
-        (holes[:, :gone] + DOT_ROOM - start) / STEP,
-        until,
-        int((border - BORDER - start) / STEP),
-        CLOSED,
-        OPEN,
-        hole,
-        RIVAL,
-        places,
-        evidences,
-        closing,
-    )
+        seen, shift, np.rint(reach / STEP).astype(np.int64), PRIORS, weights, ARCS,
+        np.ceil((needed - DOT_ROOM - start) / STEP).astype(np.int64), (holes[:, :gone] + DOT_ROOM - start) / STEP,
+        until, int((border - BORDER - start) / STEP), CLOSED, OPEN, hole, RIVAL, places, evidences, closing,
+    )  # fmt: skip
     best = float(evidences.max())
     if not np.isfinite(best):
         return None
     goes_on = float(low.sums[-1] + high.sums[-1]) + hole * gone
     least, tells = best - RIVAL, min(1.0, wide / LANES / APART_PX)
-    k, station, sigma, evidence = fittest(
-        size, seen, shift, DEPTHS, reach, places, evidences, least, LEAST_LANES, UNREFINED_PX, start, STEP, tells
-    )
-    lane_share = float(SHARES[np.argmin(DEPTHS[k])]) if LENGTHS[k] > 0 else 0.5
-    lane = float(low.at(station) + lane_share * (high.at(station) - low.at(station)))
-    outermost = station + skew * (lane_share - 0.5) * wide
-    shoulder = float(s[places[k]] - reach[k])
-    return Ending(toward, outermost, lane, shoulder, float(closing[k]), sigma, evidence, goes_on)
+    k, station, lane, sigma, shoulder, evidence = fittest(
+        size, seen, shift, DEPTHS, reach, places, evidences, POINTED, least, lower, upper, skew * wide, SHARES, start,
+        STEP, least_step, tells,
+    )  # fmt: skip
+    return Ending(toward, station, lane, shoulder, float(closing[k]), sigma, evidence, goes_on)
