@@ -202,7 +202,9 @@ def line_votes(
     for k in range(count):
         for way in range(ways):
             flat[place[way, k]] += weight[k]
-    votes[:] = flat[: votes.size].reshape(votes.shape)
+    for a in range(angles):
+        for r in range(bins):
+            votes[a, r] = flat[a * bins + r]
 
 
 @compiled

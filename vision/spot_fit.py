@@ -160,7 +160,9 @@ def fit_spots(
     unless free_shape. found (n, 4): u, v from the middle, level, base; holds the start. Written besides: shapes (n, 3),
     quality (n, 4) = variances of u, of v, of the level, mean of weighted squared residuals."""
     count, size = signal.shape
-    falls = np.exp(-usual)
+    falls = np.empty(3)
+    for i in range(3):
+        falls[i] = np.exp(-usual[i])
     bound = int(np.sqrt(size) + 0.5) // 2 - 0.5
     unknowns = 7 if free_shape else 4
     side = int(np.sqrt(size) + 0.5)

@@ -186,9 +186,8 @@ def fit(
     its bend by which a bent surface is no parabola; sigma of what counts for nothing. Written: coefficients (6,) of
     inverse depth in terms of 1, y, z, y², yz, z², covariance (3, 3) of the first three, inliers (n,)."""
     largest_bend, bent_otherwise, nowhere = limits
-    count = len(rays)
-    terms, relief, weight, values = np.empty((count, 6)), np.empty(count), np.empty(count), inverse_depth
-    far, start = np.empty(count, np.bool_), np.empty(3)
+    count, values, start = len(rays), inverse_depth, np.empty(3)
+    terms, relief, weight, far = np.empty((count, 6)), np.empty(count), np.empty(count), np.empty(count, np.bool_)
     for n in range(count):
         y, z = rays[n, 1], rays[n, 2]
         terms[n, 0], terms[n, 1], terms[n, 2] = 1.0, y, z
@@ -209,13 +208,13 @@ def fit(
     held, middle = np.empty(6), median(values)
     for i in range(6):
         held[i] = 1 / (spread[i] * middle) ** 2
-    coefficients[:] = 0.0
-    coefficients[:3] = start
+    for i in range(6):
+        coefficients[i] = start[i] if i < 3 else 0.0
     flat_cost = robust(terms, values, relief, held, coefficients[:3], weight)
     known, bent, unmodelled = 3, False, 0.0
     if near >= 16:
         curved, curved_weight = np.zeros(6), np.empty(count)
-        curved[:3] = start
+        curved[0], curved[1], curved[2] = start[0], start[1], start[2]
         curved_cost = robust(terms, values, relief, held, curved, curved_weight)
         better = (flat_cost - curved_cost) / 3 / max(curved_cost / (near - 6), 1.0)
         # A bend that is not modelled shows at the optical axis; past the nearest dot a parabola is soon anywhere.
@@ -242,7 +241,8 @@ def fit(
     scale = max(1.0, squares / max(inside - known, 1))
     factor = np.empty((known, known))
     for i in range(3):
-        factor[:] = information
+        for j in range(known * known):
+            factor[j // known, j % known] = information[j // known, j % known]
         inverse[i, i] = 1.0
         solve(factor, inverse[i])
     covariance[:] = scale * inverse[:, :3]
