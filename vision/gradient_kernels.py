@@ -203,8 +203,8 @@ def line_votes(
         for way in range(ways):
             flat[place[way, k]] += weight[k]
     for a in range(angles):
-        for r in range(bins):
-            votes[a, r] = flat[a * bins + r]
+        for column in range(bins):
+            votes[a, column] = flat[a * bins + column]
 
 
 @compiled
