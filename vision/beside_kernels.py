@@ -12,6 +12,8 @@ from vision.compiled import compiled
 Floats = NDArray[Any]
 Flags = NDArray[np.bool_]
 
+ABOUT_PX = 160.0  # standard deviation of the weight about the place that a line was fitted about
+
 
 @compiled
 def shares_beyond(dots: Floats, normals: Floats, rhos: Floats, past_px: float) -> Floats:
@@ -116,37 +118,24 @@ def longest_runs(t: Floats, agrees: Flags, window: int, gap: float, first: Float
 
 @compiled
 def runs_about(t: Floats, agrees: Flags, focus: Floats, window: int, gap: float, first: Floats, last: Floats) -> None:
-    """First and last place (k,) between which each line's steps go on about its focus (k,) with gaps no longer than
-    `gap`; the whole line where steps are nowhere dense."""
+    """First and last place (k,) between which each line's steps go on with gaps no longer than `gap`, most of them and
+    nearest to its focus (k,); the whole line where steps are nowhere dense."""
     lines, places = t.shape
     dense = np.empty(places, np.bool_)
     for line in range(lines):
         _dense(agrees[line], window, dense)
-        at = 0
-        for m in range(places):
-            if abs(t[line, m] - focus[line]) < abs(t[line, at] - focus[line]):
-                at = m
-        nearest = -1
-        for m in range(places):
-            if dense[m] and (nearest < 0 or abs(m - at) < abs(nearest - at)):
-                nearest = m
-        if nearest < 0:
-            first[line], last[line] = t[line, 0], t[line, places - 1]
-            continue
+        first[line], last[line] = t[line, 0], t[line, places - 1]
         length = t[line, 1] - t[line, 0]
-        start = stop = nearest
-        for m in range(nearest, places):
+        start, stop, total, most = 0, -places, 0.0, 0.0
+        for m in range(places):
+            if not dense[m]:
+                continue
             if (m - stop) * length > gap:
-                break
-            if dense[m]:
-                stop = m
-        for back in range(nearest + 1):
-            m = nearest - back
-            if (start - m) * length > gap:
-                break
-            if dense[m]:
-                start = m
-        first[line], last[line] = t[line, start], t[line, stop]
+                start, total = m, 0.0
+            stop = m
+            total += np.exp(-0.5 * ((t[line, m] - focus[line]) / ABOUT_PX) ** 2)
+            if total > most:
+                most, first[line], last[line] = total, t[line, start], t[line, m]
 
 
 @compiled

@@ -20,6 +20,7 @@ from vision.evidence import (
     nearer_lines,
     parallax,
     runs_at_focus,
+    seen_before,
     told_by_dots,
     typical_step,
 )
@@ -33,6 +34,9 @@ LEAST_SUPPORT = 0.5
 LEAST_SEEN = 0.38  # the same of a line beyond which dots are missing and before which none are
 FOLLOWED_PX = 25.0  # of a step that a line follows, worth as much as one unit of what else speaks for it
 ALIKE = cos(radians(4.0))  # of the angle between lines that may be one
+MOST_BEFORE = 2  # dots of the background before a line: with so many it is not the blade's
+FEW_BEYOND = 3  # missing dots past a line that tell that the blade ends there
+PLAIN = 2.5  # times the blade's own texture: a step that needs no other witness to be an edge
 FEW_MISSING = 0.05  # of the dots up to a line: so many are overlooked
 LEAST_RUN = 50.0  # px: a shorter stretch of an edge with no dots beside it is none
 
@@ -154,20 +158,23 @@ def _weighed(
         before_run = blocked(profile, blade, smooth, steps, start, stop, noise)
         gone_on_run = missing(blade, profile, start, stop)
     known = (*told_by_dots, steps, shown, before, *gone, before_run, *gone_on_run, first, last, profile.rho)
+    bounds = seen_before(blade, profile, start, stop) < MOST_BEFORE
     rows = np.stack(known).T.tolist()
     strongest = 1.0
     for _, _, _, support, step, told, hidden, empty, *_ in rows:
         if hidden < 0.5 and not told < 0.4 and empty < 0.3 and support >= LEAST_SUPPORT:
             strongest = max(strongest, step)
     found = []
-    for k, row in enumerate(rows):
+    for k in np.flatnonzero(bounds).tolist():
+        row = rows[k]
         crossed, _, _, support, step, told, hidden, empty, beyond, hidden_run, empty_run, beyond_run, *_, rho = row
         clear = 0.35 * min(max(log2(max(step, 1e-9) / strongest), -3.0), 0.5)
         clear += 0.35 * min(max(log2(max(step, 1e-9) / max(blade.texture, 1.0)), -2.0), 1.0)
         clear += 0.2 if told != told else 0.6 * told if told > 0.5 else -7.0 * (0.5 - told)
         clear -= 5.0 * crossed
-        # What lies before a step at the blade's own depth, with no dots missing up to it, is a seam or a shadow.
-        behind = 1.0 - min(max((told - 0.5) / 0.4, 0.0), 1.0) if told == told else 1.0
+        # What lies before a clear step at the blade's own depth, with no dots missing up to it, is a seam or a shadow.
+        sure = told == told and (step > PLAIN * blade.texture or beyond_run >= FEW_BEYOND)
+        behind = 1.0 - min(max((told - 0.5) / 0.4, 0.0), 1.0) if sure else 1.0
         per_missing = 5.0 if blade.grid_known else 2.5
         value, worth = (
             clear - _against(seen * behind if lost < FEW_MISSING else seen, per_missing * lost, past)

@@ -46,10 +46,8 @@ def evidence_of(edges: tuple[Candidate, ...], blade: Blade) -> float:
     if not edges:
         return 0.0
     inside = np.ones(len(blade.absent), bool)
-    total = 0.0
+    total = sum(seen_on(edge) + WORTH * edge.worth for edge in edges)
     for edge in edges:
-        side = side_of(edge, edge.profile.direction[edge.index])
-        total += float(side.evidence.sum()) + WORTH * edge.worth
         if len(blade.absent):
             inside &= blade.absent @ edge.outward < edge.rho - 4.0
     return total + (HOLE if blade.grid_known else HOLE / 2) * float(inside.sum()) + (ALONE if len(edges) == 1 else 0.0)
@@ -89,13 +87,16 @@ def unexplained(edges: tuple[Candidate, ...], blade: Blade) -> float:
     return float(inside.sum() / (inside.sum() + len(blade.dots)))
 
 
+def seen_on(edge: Candidate) -> float:
+    """What all the places along an edge say for it."""
+    return float(side_of(edge, edge.profile.direction[edge.index]).sums[-1])
+
+
 def contradicted(edges: tuple[Candidate, ...]) -> bool:
     """Whether more speaks against edges that are seen nowhere else than where they are lost than for them."""
-    total = 0.0
-    for edge in edges:
-        least = 0.0 if edge.parallax > TOLD and edge.beyond > 0 and edge.empty == 0 else -np.inf
-        total += max(side_of(edge, edge.profile.direction[edge.index]).sums[-1], least) + WORTH * edge.worth
-    return total < 0
+    told = [edge.parallax > TOLD and edge.beyond > 0 and edge.empty == 0 for edge in edges]
+    seen = (max(seen_on(edge), 0.0) if sure else seen_on(edge) for edge, sure in zip(edges, told, strict=True))
+    return sum(seen) + WORTH * sum(edge.worth for edge in edges) < 0
 
 
 def find_closed(
@@ -240,8 +241,7 @@ def with_partner(chosen: Candidate, candidates: list[Candidate], blade: Blade, l
     for edge in candidates:
         if edge is chosen or edge.worth < LEAST_PARTNER or not opposite(edge, chosen, blade, largest):
             continue
-        first, last = edge.profile.t[edge.index][[0, -1]]
-        evidence = float(side_of(edge, edge.profile.direction[edge.index]).evidence.sum())
+        (first, last), evidence = edge.profile.t[edge.index][[0, -1]], seen_on(edge)
         if edge.ends[1] - edge.ends[0] < 0.75 * (last - first) or evidence < CLEAR:
             continue
         evidence += WORTH * edge.worth

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.candidates import LEAST_SUPPORT, Candidate, weigh
+from vision.candidates import LEAST_RUN, LEAST_SUPPORT, PLAIN, Candidate, weigh
 from vision.capture import Image
-from vision.closing import contradicted, evidence_of, find_closed, goes_on, opposite, unexplained, with_partner
+from vision.closing import contradicted, evidence_of, find_closed, goes_on, opposite, seen_on, unexplained, with_partner
 from vision.continued import continues
 from vision.edge_fit import lens_bend, settled, trimmed
 from vision.ending import Ending
@@ -34,9 +34,11 @@ LEAST_VALUE = 1.2
 MOST_MISSING = 0.35  # of the dots within the edges, beyond which they are not believed
 NOT_THERE = 0.25  # of a step that the other eye sees at the blade's depth: with less it is behind the blade
 LEAST_GONE = 3  # missing dots between two steps that tell which of them is the edge
-PLAIN = 2.5  # times the blade's own texture: a step that needs no other witness to be an edge
 BEHIND_SHOULDER = 12.0  # px: so far behind it an end no longer bends the edges
+SHORT = 100.0  # px: an edge that is seen no farther may be bent by the end that it is seen before
+UNSURE, SHORT_UNSURE = np.deg2rad(1.0), np.deg2rad(0.5)  # standard deviations of direction, from which none is told
 OUTSHINES = 3.0  # times another step
+SEEN_ON = 0.01  # of one unit of a candidate's value, what one of evidence along all of it is worth
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
 
 
@@ -65,7 +67,10 @@ def find_edges(
     largest = LARGEST_TAPER if expected is None else LARGEST_FLARE
     there = [c for c in candidates if not c.parallax < NOT_THERE]
     typical = typical_edge(there)
-    believed = [c for c in there if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))]
+    believed = [c for c in there if c.ends[1] - c.ends[0] > LEAST_RUN]
+    believed = [
+        c for c in believed if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))
+    ]
     clear = [c for c in believed if not _faint_behind_gaps(c, blade)]
     clear, chosen = _chosen(clear, candidates, smooth, blade, other, noise, largest)
     if len(chosen) == 1:
@@ -83,13 +88,18 @@ def find_edges(
         return Found((), axis, None, (f"no edge: {missing:.0%} of the dots within the likeliest ones are missing",))
     elif contradicted(chosen):
         return Found((), axis, None, ("no edge: steps and dots contradict each other",))
-    if ending is not None and not chosen:
+    if ending is not None:
         axis = float(np.arctan2(ending.toward[1], ending.toward[0]) % np.pi)
-        return Found((), axis, ending, ("no edge: only the spiked tip is in view",))
+        if not chosen:
+            return Found((), axis, ending, ("no edge: only the spiked tip is in view",))
     if not chosen:
-        best = max((c.support for c in candidates), default=0.0)
-        return Found((), axis, None, (f"no edge: the best line beside the dots has {best:.0%} support",))
+        return Found((), axis, None, (f"no edge: {_why_none(candidates, believed, blade)}",))
     chosen = tuple(settled(edge, ending is not None, _bend_at_focus(edge, blade)) for edge in chosen)
+    told = tuple(c for c in chosen if _sure(c))
+    if not told:
+        least = np.rad2deg(min(float(c.profile.slope_sigma[c.index]) for c in chosen))
+        return Found((), axis, ending, (f"no edge: its direction is known only to {least:.1f}°",))
+    chosen = told
     directions = np.array([np.arctan2(c.outward[1], c.outward[0]) + np.pi / 2 for c in chosen])
     axis = 0.5 * np.angle(np.exp(2j * directions).sum()) % np.pi
     return Found(chosen, float(axis), ending, ())
@@ -114,6 +124,30 @@ def _chosen(
         asked += new
         on_blade = [c for c in new if continues(c, smooth, other, noise)]
         clear = [c for c in clear if not any(c is one for one in on_blade)]
+
+
+def _sure(edge: Candidate) -> bool:
+    """Whether an edge's direction is known well enough to tell of it."""
+    most = SHORT_UNSURE if edge.ends[1] - edge.ends[0] < SHORT else UNSURE
+    return bool(edge.profile.slope_sigma[edge.index] < most)
+
+
+def _why_none(candidates: list[Candidate], believed: list[Candidate], blade: Blade) -> str:
+    """What speaks against the line that would sooner be an edge than any other."""
+    if not candidates:
+        return "no step goes on beside the dots"
+    best = max(candidates, key=lambda c: (c.value, c.worth))
+    if best.support < LEAST_SUPPORT:
+        return f"the best line shows a step on {best.support:.0%} of its way beside the dots"
+    if best.parallax < NOT_THERE:
+        return "the best line lies behind the blade, as the other eye sees it"
+    if best not in believed:
+        return "the best line is imaged as a shadow, a seam or a streak is, and no dots are missing beyond it"
+    if best.empty > MOST_EMPTY:
+        return f"{best.empty:.0%} of the dots before the best line are missing"
+    if best.blocked > 0.5:
+        return "a step as strong lies between the best line and the dots"
+    return f"the best line is no clearer than the blade's own texture of {blade.texture:.0f} grey levels"
 
 
 def _bend_at_focus(edge: Candidate, blade: Blade) -> float:
@@ -167,7 +201,7 @@ def _choose(candidates: list[Candidate], blade: Blade, largest: float) -> tuple[
         for b in range(a + 1, len(good)):
             if not opposite(good[a], good[b], blade, largest):
                 continue
-            total = good[a].value + good[b].value
+            total = good[a].value + good[b].value + SEEN_ON * (seen_on(good[a]) + seen_on(good[b]))
             if best_pair is None or total > best_pair[0]:
                 best_pair = (total, (good[a], good[b]))
     if best_pair is not None and min(c.value for c in best_pair[1]) > good[0].value - SECOND_EDGE:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import sqrt
 from typing import Any
 
@@ -28,6 +28,7 @@ ACROSS, GRADUAL, SHADED = 2, 0.45, 8  # samples across a sharp step, how much of
 PARALLAX_PX, PARALLAX_SAMPLES = 5.0, 19  # how far about that range the other eye's step is looked for
 PARALLAX_STEP = 0.4  # of a step, what the other eye has to see of it
 LEAST_PARALLAX_PX, LEAST_PLACES = 6.0, 5  # against the far background, and places with a step, that tell depths apart
+WITHIN = 0.95  # of the dots, past which a step before a line is looked for
 PLANE_PX = 4.0  # how far from a line a dot must lie to count on one side of it
 BEYOND_PX = 45.0  # so far past a line missing dots tell that the blade ends there
 RUN_PLACES = 7  # along a line, of which most must show a step
@@ -42,7 +43,7 @@ class Blade:
     strays: share of the dots that may lie beyond an edge all the same. grid_known: `absent` rests on the laser's own
     grid.
     slope (2,): of the surface, change of depth to the right and down; focal: in working px; camera: that sees it, of
-    the working image; None where unknown.
+    the working image; None where unknown. behind (m, 2): dots far behind the blade.
     """
 
     dots: Array
@@ -53,6 +54,7 @@ class Blade:
     slope: Array | None = None
     focal: float = 616.0
     camera: Camera | None = None
+    behind: Array = field(default_factory=lambda: np.empty((0, 2)))
 
     def on_surface(self, point: Array, way: Array) -> Array:
         """Unit vector (3,) on the surface that is seen as `way` (2,) at `point` (2,) of the image."""
@@ -142,6 +144,18 @@ def missing(blade: Blade, profile: Profiles, low: Array, high: Array) -> tuple[A
     return empty, beyond
 
 
+def seen_before(blade: Blade, profile: Profiles, low: Array, high: Array) -> NDArray[np.int64]:
+    """How many dots far behind the blade (k,) are seen before each line, farther out than half of the blade's own,
+    between low and high (k,) along it: there it is not the blade that the line bounds."""
+    if len(blade.behind) == 0:
+        return np.zeros(len(low), np.int64)
+    across, along = profile.normal @ blade.behind.T, profile.direction @ blade.behind.T
+    middle = np.median(profile.normal @ blade.dots.T, axis=1)
+    inside = (across < profile.rho[:, None] - PLANE_PX) & (across > middle[:, None])
+    inside &= (along > low[:, None]) & (along < high[:, None])
+    return np.asarray(inside.sum(axis=1))
+
+
 def blocked(
     profile: Profiles, blade: Blade, smooth: Image, step: Array, low: Array, high: Array, noise: float
 ) -> Array:
@@ -174,7 +188,7 @@ def _steps_before(profile: Profiles, blade: Blade, smooth: Image, low: Array, hi
     dots, and the places (k, places) along it."""
     places = low[:, None] + (high - low)[:, None] * INWARD_SHARES
     last = len(blade.dots) - 1
-    across = outermost(blade.dots, profile.normal, last - round(0.85 * last))
+    across = outermost(blade.dots, profile.normal, last - round(WITHIN * last))
     change = np.empty((len(low), INWARD_PLACES, INWARD_SAMPLES - 2))
     depth = profile.rho - across - 3
     steps_before(smooth, profile.normal, profile.rho, places, depth, FIRST_INWARD, INWARD_STEP, change)

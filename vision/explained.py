@@ -23,6 +23,7 @@ Flags = NDArray[np.bool_]
 LEAST_LEVEL = 0.4  # of the matched dots' level: a fainter spot that no other eye confirms is none
 OFF_GRID = 0.08  # of the grid's spacing, for a spot that only one eye has read
 LEAST_INVERSE = 0.03  # 1/m
+BEHIND_M = 1.0  # farther than the blade's surface goes on: no thick blade's rounded side
 BORDER_PX = 6  # of the working image, within which a dot may be missed
 
 
@@ -75,6 +76,13 @@ def absent_dots(
     hull = cv2.convexHull(left.uv[blade.left].astype(np.float32))[:, 0]
     _leave_outside(pixels, hull, open_)
     return np.asarray(pixels[open_] - stereo.left.centre, float)
+
+
+def dots_behind(left: Spots, rays: Array, matches: Matches, blade: Matches, surface: Surface, centre: Array) -> Array:
+    """Where the left image (image frame, working px) shows dots so far behind the blade that they lie on none of it."""
+    other = matches.take(matches.surface != blade.surface[0])
+    depth = 1 / np.maximum(surface.inverse_depth(rays[other.left]), LEAST_INVERSE)
+    return np.asarray(left.uv[other.left[1 / other.inverse_depth > depth + BEHIND_M]] - centre, float)
 
 
 def _size(camera: Camera) -> tuple[int, int]:

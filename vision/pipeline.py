@@ -12,7 +12,7 @@ from vision.chord import chord, heading
 from vision.dots import Spots, find_spots
 from vision.edges import edge_of, find_edges
 from vision.evidence import Blade, OtherEye, texture_between
-from vision.explained import absent_dots, explained_dots
+from vision.explained import absent_dots, dots_behind, explained_dots
 from vision.grid import Matches, match_eyes, match_laser, nearest_surface, reachable
 from vision.lines import smoothed
 from vision.mosaic import demosaiced
@@ -142,6 +142,7 @@ class Eye:
             slope=surface.slope,
             focal=camera.fx,
             camera=camera,
+            behind=dots_behind(left, rays, matches, blade, surface, camera.centre),
         )
         other = None
         if right is not None:
