@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.camera import RigGeometry
+from vision.camera import Camera, RigGeometry
 from vision.candidates import Candidate
 from vision.capture import Image, StereoFrames
 from vision.chord import chord, heading
@@ -60,6 +62,14 @@ class Eye:
 
         expected: direction of the blade's axis in the left image, rad modulo π, where tracker or survey know it.
         """
+        seen = self._observe(frames, expected)
+        if seen.valid or frames.left is None:
+            return seen
+        # the laser-off images may show what moved otherwise than the blade: dots that stand out need none
+        alone = self._observe(dataclasses.replace(frames, left=None, right=None), expected)
+        return alone if alone.valid else seen
+
+    def _observe(self, frames: StereoFrames, expected: float | None) -> BladeObservation:
         watch = Stopwatch(self._now)
         if frames.left_laser is None:
             return self._refused(frames, watch, "no left_laser image")
@@ -67,7 +77,8 @@ class Eye:
         for name in ("left", "left_laser", "right", "right_laser"):
             image: Image | None = getattr(frames, name)
             if image is not None:
-                self._check_size(name, image)
+                stereo = self.geometry.stereo
+                _check_size(name, image, stereo.right if name.startswith("right") else stereo.left)
                 images[name] = reduce_image(image, self.factor, self.geometry.bayer)
         watch.lap("reduce")
         small, tones = half_green_and_tones(images["left_laser"], "tones of left")
@@ -82,8 +93,7 @@ class Eye:
         laser = self.geometry.laser
         if laser is None:
             return self._refused(frames, watch, "the rig has no laser, so dots have no index")
-        rays = self._stereo.left.rays(left.uv)
-        focal = self._stereo.left.fx
+        rays, focal = self._stereo.left.rays(left.uv), self._stereo.left.fx
         if right is not None:
             rays_right = self._stereo.right.rays(right.uv)
             matches, ambiguous = match_eyes(
@@ -151,8 +161,7 @@ class Eye:
             other = OtherEye(smoothed(behind, room), self._stereo, surface)
         found = find_edges(clean, smooth, around, other, expected)
         watch.lap("edges")
-        edges = found.edges
-        axis, reasons = found.axis, found.reasons
+        edges, axis, reasons = found.edges, found.axis, found.reasons
         watch.lap("tip")
         points = rays[blade.left] / blade.inverse_depth[:, None]
         near = _station_near(dots, axis) if edges else None
@@ -162,7 +171,6 @@ class Eye:
             direction = axis
         sharp = sharpness(clean, edges)
         bright = exposure(images.get("left", clean), seeds)
-        order = _left_first(edges, axis)
         dots_left = explained_dots(left, rays, matches, surface, laser, factor)
         dots_right = None
         if right is not None:
@@ -186,7 +194,7 @@ class Eye:
             distance_m=surface.depth_m,
             distance_sigma_m=float(np.sqrt(surface.covariance[0, 0])),
             nearest_m=surface.nearest_m(rays[blade.left]),
-            edges=tuple(edge_of(edges[k], factor) for k in order),
+            edges=tuple(edge_of(edges[k], factor) for k in _left_first(edges, axis)),
             tip=tip_of(found.ending, factor) if found.ending is not None else None,
             heading=direction,
             heading_sigma=_heading_sigma(edges) if direction is not None else None,
@@ -196,14 +204,6 @@ class Eye:
             exposure=bright,
             elapsed_ms=watch.elapsed_ms,
         )
-
-    def _check_size(self, name: str, image: Image) -> None:
-        camera = self.geometry.stereo.right if name.startswith("right") else self.geometry.stereo.left
-        if image.shape[:2] != (camera.height, camera.width):
-            raise ValueError(
-                f"{name} image is {image.shape[1]} × {image.shape[0]} pixels, "
-                f"the rig's camera {camera.width} × {camera.height}"
-            )
 
     def _refused(self, frames: StereoFrames, watch: Stopwatch, *reasons: str) -> BladeObservation:
         grey = brightness(frames.left_laser) if frames.left_laser is not None else 0.0
@@ -217,15 +217,16 @@ def observe_single(image: Image, geometry: RigGeometry | None = None, now: Now |
     it: the rig's geometry is accepted so that a caller need not ask, and checked against the image's size. now: as for
     the Eye."""
     if geometry is not None:
-        camera = geometry.stereo.left
-        if image.shape[:2] != (camera.height, camera.width):
-            raise ValueError(
-                f"image is {image.shape[1]} × {image.shape[0]} pixels, "
-                f"the rig's camera {camera.width} × {camera.height}"
-            )
+        _check_size("the", image, geometry.stereo.left)
         if geometry.bayer is not None and image.ndim == 2:
             image = demosaiced(image, geometry.bayer)
     return observe_photograph(image, now=now)
+
+
+def _check_size(name: str, image: Image, camera: Camera) -> None:
+    (height, width), there = image.shape[:2], f"{camera.width} × {camera.height}"
+    if (height, width) != (camera.height, camera.width):
+        raise ValueError(f"{name} image is {width} × {height} pixels, the rig's camera {there}")
 
 
 def _station_near(dots: Array, axis: float) -> Array:

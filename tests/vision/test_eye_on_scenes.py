@@ -263,3 +263,13 @@ def test_one_eye_and_the_laser_still_give_a_distance() -> None:
     scene = draw_scene(replace(PLAIN, laser_position_m=(0.0, 0.25, -0.1)))
     observation = Eye(scene.geometry).observe(replace(scene.frames, right=None, right_laser=None))
     assert observation.valid and observation.distance_m == pytest.approx(scene.truth.distance_m, rel=0.03)
+
+
+def test_laser_off_images_of_something_else_do_not_blind_the_eye() -> None:
+    scene = draw_scene(replace(PLAIN, brightness=60.0))
+    assert scene.frames.left_laser is not None
+    burnt = np.full_like(scene.frames.left_laser, 255)
+    observation = Eye(scene.geometry).observe(replace(scene.frames, left=burnt, right=burnt))
+    assert observation.valid, observation.reasons
+    assert observation.distance_m == pytest.approx(scene.truth.distance_m, rel=0.01)
+    assert_edges(scene, observation)
