@@ -37,6 +37,10 @@ LEAST_GONE = 3  # missing dots between two steps that tell which of them is the 
 BEHIND_SHOULDER = 12.0  # px: so far behind it an end no longer bends the edges
 SHORT = 100.0  # px: an edge that is seen no farther may be bent by the end that it is seen before
 UNSURE, SHORT_UNSURE = np.deg2rad(1.0), np.deg2rad(0.5)  # standard deviations of direction, from which none is told
+LEVEL = (
+    1.2,
+    0.25,
+)  # of the dots' spacing: how near along an edge, and farther out but for this, a dot is level with a gap
 OUTSHINES = 3.0  # times another step
 SEEN_ON = 0.01  # of one unit of a candidate's value, what one of evidence along all of it is worth
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
@@ -71,7 +75,7 @@ def find_edges(
     believed = [
         c for c in believed if c.beyond > 0 or (not _outshone(c, candidates) and like_an_edge(c, tones, typical))
     ]
-    clear = [c for c in believed if not _faint_behind_gaps(c, blade)]
+    clear = [c for c in believed if not _faint_behind_gaps(c, believed, blade)]
     clear, chosen = _chosen(clear, candidates, smooth, blade, other, noise, largest)
     if len(chosen) == 1:
         chosen = with_partner(chosen[0], clear, blade, largest)
@@ -168,11 +172,29 @@ def _outshone(one: Candidate, candidates: list[Candidate]) -> bool:
     )
 
 
-def _faint_behind_gaps(one: Candidate, blade: Blade) -> bool:
-    """Whether a step hardly clearer than the blade's own shade has dots missing before it: there the blade has ended,
-    too faintly to be seen, and this is of what is behind it."""
-    missing = one.empty / max(1 - one.empty, 1e-6) * len(blade.dots) / 2  # of the outer half of them
-    return one.step < PLAIN * blade.texture and missing >= LEAST_GONE
+def _faint_behind_gaps(one: Candidate, believed: list[Candidate], blade: Blade) -> bool:
+    """Whether a step hardly clearer than the blade's own shade, and far fainter than the edge on the other side where
+    there is one, has dots missing before it: there the blade has ended, too faintly to be seen, and this is of what is
+    behind it."""
+    across = [
+        c.step for c in believed if c.beyond >= LEAST_GONE and c.value >= LEAST_VALUE and c.outward @ one.outward < 0
+    ]
+    if across and one.step > max(across) / 2:
+        return False
+    if one.step >= PLAIN * blade.texture or one.empty == 0 or len(blade.dots) < 2:
+        return False
+    depth = blade.absent @ one.outward - one.rho
+    dots = blade.dots @ one.outward - one.rho
+    before = (depth < -4.0) & (depth > np.median(dots))
+    gone, depth = blade.absent[before], depth[before]
+    way = np.array([-one.outward[1], one.outward[0]])
+    apart = np.hypot(*(blade.dots[:, None] - blade.dots).transpose(2, 0, 1)) + np.diag(np.full(len(dots), np.inf))
+    spacing = float(np.median(apart.min(axis=1)))
+    beside = (
+        np.abs((gone @ way)[:, None] - blade.dots @ way) < LEVEL[0] * spacing
+    )  # where dirt hides one it does not end
+    level = beside & (dots > depth[:, None] - LEVEL[1] * spacing)
+    return int((~level.any(axis=1)).sum()) >= LEAST_GONE
 
 
 def _hides_nothing(one: Candidate, candidates: list[Candidate], blade: Blade) -> bool:

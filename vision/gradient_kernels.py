@@ -212,7 +212,8 @@ def line_peaks(
     votes: Floats, least: float, angle: NDArray[np.int64], place: NDArray[np.int64], strength: Floats
 ) -> int:
     """Peaks of votes (angles, bins), smoothed over three bins, that are more than `least` and the highest among three
-    angles and five bins; past the last angle lies the first with its bins turned round. Written: angle and place (m,)
+    angles and five bins, as they are or smoothed: of two lines side by side the smoothed ones tell only one. Past the
+    last angle lies the first with its bins turned round. Written: angle and place (m,)
     of each and its strength (m,); returned: how many, at most m."""
     angles, bins = votes.shape
     smooth = np.zeros((angles + 2, bins + 4), np.float32)
@@ -235,6 +236,12 @@ def line_peaks(
             highest = True
             for k in range(5):
                 highest &= (over[r + k] <= value) & (here[r + k] <= value) & (under[r + k] <= value)
+            if not highest and votes[a, r] > value:
+                highest = True
+                for k in range(max(r - 2, 0), min(r + 3, bins)):
+                    highest &= votes[a, k] <= votes[a, r]
+                    highest &= (a == 0) | (votes[a - 1, k] <= votes[a, r])
+                    highest &= (a == angles - 1) | (votes[(a + 1) % angles, k] <= votes[a, r])
             if highest:
                 angle[count], place[count], strength[count] = a, r, value
                 count += 1
