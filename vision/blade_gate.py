@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from vision.blade_measurement import Measurement, measure, side_of
 from vision.blade_model import BladeModel
-from vision.blade_motion import PLANE, SLOPES, Side
+from vision.blade_motion import EDGE, PLANE, SIDES, SLOPES, Side
 from vision.camera import Camera
 from vision.capture import CameraPose
 from vision.estimate import BladeFrame
@@ -71,6 +71,10 @@ class BladeGate:
         taken."""
         settings = self.settings
         there = self.meets(observation, pose)
+        low, high = sorted(float(model.mean[EDGE[side].start]) for side in SIDES)
+        aside = max(low - there[1], there[1] - high)
+        if aside > settings.largest_chord_m:
+            return Judged(UpdateResult(False, reasons=(f"what is seen lies {aside:.1f} m beside the blade",)), model)
         model = model.seen_from(self.frame.to_blade(pose.position)).moved(there[0], there[1], settings)
         surface = self._measure(observation, {}, pose, model, tremble, late_s)
         nis, dof = innovation(model, surface, ["surface"])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from vision.camera import Camera
@@ -405,6 +406,28 @@ def test_a_surface_far_behind_the_blade_is_never_taken_for_it() -> None:
     for k in range(60):
         assert not tracker.update(moved(flight.observation(2.0 + k * PERIOD, true), 2.5), true).accepted
     assert lost(tracker.estimate(8.0, true), 3.0, 0.5) is not None
+
+
+def test_what_is_seen_far_beside_the_blade_is_none_of_it() -> None:
+    """While backing off from a root the camera may look past it: at the tower, with the same lean to it."""
+    flight, tracker, true = settled()
+    frame = flight.blade.frame
+    turned = Rotation.from_rotvec(-0.6 * frame.span).as_matrix() @ true.rotation
+    back, wall = CameraPose(true.position - 6.0 * frame.depth, turned, true.sigma_m), 17.0 / np.cos(0.6)
+    before = tracker.estimate(2.0, true).distance_m
+    for k in range(8):
+        seen = replace(
+            flight.observation(2.0 + 0.2 * k, true),
+            distance_m=wall,
+            distance_sigma_m=0.5,
+            plane_point=np.array([wall, 0.0, 0.0]),
+            plane_covariance=np.diag([0.25, 0.01, 0.01]),
+            edges=(),
+        )
+        result = tracker.update(seen, back)
+        assert not result.accepted
+        assert any("beside the blade" in reason or "survey" in reason for reason in result.reasons)
+    assert abs(tracker.estimate(3.6, true).distance_m - before) < 0.1
 
 
 def test_scattered_outliers_do_not_add_up_to_a_restart() -> None:
