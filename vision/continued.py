@@ -57,7 +57,10 @@ def continues(edge: Candidate, smooth: Image, other: OtherEye, noise: float) -> 
     points, places = points[inside] + half, places[:, inside]
     seen = sampled(smooth, points[:, 0], points[:, 1])
     unlike = _spread(seen - sampled(other.smooth, places[..., 0], places[..., 1]))
-    blade, nearer, behind = unlike.reshape(3, -1).min(axis=1)
+    (before, blade, after), *elsewhere = unlike.reshape(3, -1)
+    if not blade <= min(before, after):
+        return False  # it lies nearer or farther off
+    nearer, behind = (float(each.min()) for each in elsewhere)
     varied = float(_spread(seen[None])[0])
     return bool(blade < min(ALIKE * min(nearer, behind), noise, varied / PAINTED))
 
