@@ -29,7 +29,6 @@ PAINTED = 2.0  # times what the eyes differ by, that the stretch itself has to v
 def continues(edge: Candidate, smooth: Image, other: OtherEye, noise: float) -> bool:
     """Whether both eyes see the blade's own surface just beyond a step. smooth (h, w, c): the left eye's working image,
     smoothed; noise: of its pixels, in grey levels. False where nothing is painted on it that could tell."""
-    stereo, surface = other.stereo, other.surface
     profile, k = edge.profile, edge.index
     t = np.linspace(edge.ends[0], edge.ends[1], PLACES)
     base = edge.rho + 0.5 * profile.bend[k] * (t - profile.focus[k]) ** 2
@@ -39,10 +38,7 @@ def continues(edge: Candidate, smooth: Image, other: OtherEye, noise: float) -> 
     points = points[(np.abs(points) < half - 2).all(axis=1)]
     if len(points) < LEAST_POINTS:
         return False
-    rays = stereo.left.rays(points + stereo.left.centre)
-    inverse = np.clip((1 - rays[:, 1:] @ surface.slope) / surface.depth_m, 0.02, 1.5)
-    there = stereo.right.project((rays / inverse[:, None]) @ stereo.rotation.T + stereo.translation)
-    far = stereo.right.project(rays @ stereo.rotation.T)
+    there, _, far = other.shows(points)
     apart = float(np.mean(np.hypot(*(far - there).T)))
     if apart < LEAST_APART_PX:
         return False

@@ -37,10 +37,7 @@ LEAST_GONE = 3  # missing dots between two steps that tell which of them is the 
 BEHIND_SHOULDER = 12.0  # px: so far behind it an end no longer bends the edges
 SHORT = 100.0  # px: an edge that is seen no farther may be bent by the end that it is seen before
 UNSURE, SHORT_UNSURE = np.deg2rad(1.0), np.deg2rad(0.5)  # standard deviations of direction, from which none is told
-LEVEL = (
-    1.2,
-    0.25,
-)  # of the dots' spacing: how near along an edge, and farther out but for this, a dot is level with a gap
+LEVEL_ALONG, LEVEL_OUT = 1.2, 0.25  # of the dots' spacing: how far along and inward of a gap a dot is level with it
 OUTSHINES = 3.0  # times another step
 SEEN_ON = 0.01  # of one unit of a candidate's value, what one of evidence along all of it is worth
 SECOND_EDGE = 2.2  # how much less than the better edge the other one may be worth
@@ -122,12 +119,12 @@ def _chosen(
     asked: list[Candidate] = []
     while True:
         chosen = _choose([c for c in clear if not _hides_nothing(c, candidates, blade)], blade, largest)
-        new = [c for c in chosen if c.beyond == 0 and not any(c is one for one in asked)]
+        new = [c for c in chosen if c.beyond == 0 and c not in asked]
         if other is None or not new:
             return clear, chosen
         asked += new
         on_blade = [c for c in new if continues(c, smooth, other, noise)]
-        clear = [c for c in clear if not any(c is one for one in on_blade)]
+        clear = [c for c in clear if c not in on_blade]
 
 
 def _sure(edge: Candidate) -> bool:
@@ -183,17 +180,13 @@ def _faint_behind_gaps(one: Candidate, believed: list[Candidate], blade: Blade) 
         return False
     if one.step >= PLAIN * blade.texture or one.empty == 0 or len(blade.dots) < 2:
         return False
-    depth = blade.absent @ one.outward - one.rho
-    dots = blade.dots @ one.outward - one.rho
+    depth, dots = blade.absent @ one.outward - one.rho, blade.dots @ one.outward - one.rho
     before = (depth < -4.0) & (depth > np.median(dots))
     gone, depth = blade.absent[before], depth[before]
     way = np.array([-one.outward[1], one.outward[0]])
-    apart = np.hypot(*(blade.dots[:, None] - blade.dots).transpose(2, 0, 1)) + np.diag(np.full(len(dots), np.inf))
-    spacing = float(np.median(apart.min(axis=1)))
-    beside = (
-        np.abs((gone @ way)[:, None] - blade.dots @ way) < LEVEL[0] * spacing
-    )  # where dirt hides one it does not end
-    level = beside & (dots > depth[:, None] - LEVEL[1] * spacing)
+    # Where a dot is seen as far out beside a gap, dirt hides one: the blade has not ended.
+    level = np.abs((gone @ way)[:, None] - blade.dots @ way) < LEVEL_ALONG * blade.spacing
+    level &= dots > depth[:, None] - LEVEL_OUT * blade.spacing
     return int((~level.any(axis=1)).sum()) >= LEAST_GONE
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import sqrt
 from typing import Any
 
@@ -56,6 +57,13 @@ class Blade:
     camera: Camera | None = None
     behind: Array = field(default_factory=lambda: np.empty((0, 2)))
 
+    @cached_property
+    def spacing(self) -> float:
+        """Usual distance in px from a dot to the nearest other one, of two dots at least."""
+        apart = np.hypot(*(self.dots[:, None] - self.dots).transpose(2, 0, 1))
+        np.fill_diagonal(apart, np.inf)
+        return float(np.median(apart.min(axis=1)))
+
     def on_surface(self, point: Array, way: Array) -> Array:
         """Unit vector (3,) on the surface that is seen as `way` (2,) at `point` (2,) of the image."""
         (u, v), (x, y), focal = point.tolist(), way.tolist(), self.focal
@@ -85,6 +93,15 @@ class OtherEye:
     smooth: Image
     stereo: StereoPair
     surface: Surface
+
+    def shows(self, points: Array) -> Array:
+        """Pixels (3, n, 2) at which it sees points (n, 2) of the left eye's image frame: on the plane of the surface,
+        ROUND_M behind that, and infinitely far off."""
+        rays = self.stereo.left.rays(points + self.stereo.left.centre)
+        inverse = np.clip((1 - rays[:, 1:] @ self.surface.slope) / self.surface.depth_m, 0.02, 1.5)
+        depth, turned, aside = (1 / inverse)[:, None], rays @ self.stereo.rotation.T, self.stereo.translation
+        seen = np.stack((turned * depth + aside, turned * (depth + ROUND_M) + aside, turned))
+        return self.stereo.right.project(seen).reshape(3, -1, 2)
 
 
 def texture_between(smooth: Image, dots: Array) -> float:
@@ -200,16 +217,10 @@ def parallax(profile: Profiles, other: OtherEye, beside: NDArray[np.bool_], nois
 
     NaN where the line's parallax against the far background is too small to tell them apart.
     """
-    stereo, surface = other.stereo, other.surface
     t = profile.t[:, ::2]
     lines, places = t.shape
     points = (profile.normal * profile.rho[:, None])[:, None] + t[..., None] * profile.direction[:, None]
-    rays = stereo.left.rays((points + stereo.left.centre).reshape(-1, 2))
-    inverse = np.clip((1 - rays[:, 1:] @ surface.slope) / surface.depth_m, 0.02, 1.5)
-
-    depth, turned = (1 / inverse)[:, None], rays @ stereo.rotation.T
-    seen = np.stack((turned * depth + stereo.translation, turned * (depth + ROUND_M) + stereo.translation, turned))
-    there, deeper, far = stereo.right.project(seen).reshape(3, lines, places, 2)
+    there, deeper, far = other.shows(points.reshape(-1, 2)).reshape(3, lines, places, 2)
     share = np.empty(lines)
     shares_at_depth(
         other.smooth, there, deeper, far, profile.normal, profile.step, profile.agrees, beside, PARALLAX_PX,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -63,8 +64,9 @@ def observe_photograph(image: Image, stamp_s: float = 0.0, now: Now | None = Non
     dots, places = ((uv + 0.5) * factor - 0.5 - centre for uv in (grid.spots.uv[lattice.member], fan.uv))
     in_view = np.asarray((np.abs(places) < centre - BORDER_PX).all(axis=1), np.bool_)
     middle = middle_place(grid.spots.uv, lattice, (np.array(grid.image.shape[1::-1]) - 1) / 2)
-    found = _outline(clean, dots, places, fan, in_view, middle)
-    found = _on_one_surface(found, clean, dots, lattice)
+    picture = _Picture.of(clean)
+    found = _outline(picture, dots, places, fan, in_view, middle)
+    found = _on_one_surface(found, picture, dots, lattice)
     watch.lap("edges")
     edges, axis, to_photograph = found.edges, found.axis, 1 / (factor * grid.scale)
     return BladeObservation(
@@ -133,46 +135,61 @@ def _too_few(grid: DotGrid | None) -> str:
     return f"too few laser dots in a grid: {count} of {len(grid.spots)} bright spots, {LEAST_DOTS} are needed"
 
 
-def _outline(clean: Image, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_], middle: Array) -> Found:
+@dataclass(frozen=True)
+class _Picture:
+    """A photograph free of dots (h, w, c), the same smoothed, its noise in grey levels, and its lines (k, 2)."""
+
+    clean: Image
+    smooth: Image
+    noise: float
+    lines: Array
+
+    @classmethod
+    def of(cls, clean: Image) -> _Picture:
+        noise = sensor_noise(clean)
+        return cls(clean, smoothed(clean), noise, hough_lines(clean, noise, MOST_LINES))
+
+
+def _outline(
+    picture: _Picture, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_], middle: Array
+) -> Found:
     """Edges and end of the blade that carries dots (n, 2); places (m, 2): where the fan has none; image frame."""
-    smooth, size = smoothed(clean), (clean.shape[1], clean.shape[0])
+    clean, smooth, noise = picture.clean, picture.smooth, picture.noise
+    size = (clean.shape[1], clean.shape[0])
     texture = texture_between(smooth, dots + (np.array(size) - 1) / 2)
     strays = max(Blade.strays, STRAYS / len(dots))
-    lines = hough_lines(clean, sensor_noise(clean), MOST_LINES)
     refused = None
     for absent in (fan.central(middle), fan.certain()):
         blade = Blade(dots, places[absent & in_view], texture, strays=strays, grid_known=False)
         found = find_edges(clean, smooth, blade, None)
-        found = with_cut_end(found, weigh(lines, blade, smooth, sensor_noise(clean), None), blade, size)
+        found = with_cut_end(found, weigh(picture.lines, blade, smooth, noise, None), blade, size)
         missing = _share_missing(found, dots, places, fan, in_view)
         if found.edges and missing < MOST_MISSING:
-            return _held_against_outline(found, clean, smooth, dots, places, fan, in_view)
+            return _held_against_outline(found, picture, dots, places, fan, in_view)
         if found.edges:
             found = Found(
                 (), found.axis, None, (f"no edge: {missing:.0%} of the dots within the likeliest ones are missing",)
             )
         refused = refused or found
     assert refused is not None
-    return _held_against_outline(refused, clean, smooth, dots, places, fan, in_view)
+    return _held_against_outline(refused, picture, dots, places, fan, in_view)
 
 
-def _on_one_surface(found: Found, clean: Image, dots: Array, lattice: Lattice) -> Found:
+def _on_one_surface(found: Found, picture: _Picture, dots: Array, lattice: Lattice) -> Found:
     """What was found, or nothing where some of the dots (n, 2) lie on what is behind the blade: its edges then run
     between them, and those found enclose both."""
-    noise = sensor_noise(clean)
-    lines = hough_lines(clean, noise, MOST_LINES)
-    if not found.edges or not on_two_surfaces(lines, dots, lattice, smoothed(clean), noise):
+    if not found.edges or not on_two_surfaces(picture.lines, dots, lattice, picture.smooth, picture.noise):
         return found
     return Found((), found.axis, None, ("no edge: the dots lie on two surfaces, one behind the other",))
 
 
 def _held_against_outline(
-    found: Found, clean: Image, smooth: Image, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_]
+    found: Found, picture: _Picture, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_]
 ) -> Found:
     """What was found, or what the blade's silhouette tells where the blade stands out from all that is around it and
     no dots are missing on it."""
-    noise, half = sensor_noise(clean), (np.array(clean.shape[1::-1]) - 1) / 2
-    silhouette = silhouette_of(clean, dots + half, noise)
+    half = (np.array(picture.clean.shape[1::-1]) - 1) / 2
+    silhouette = silhouette_of(picture.clean, dots + half, picture.noise)
     if silhouette is None:
         return found
     core = cv2.erode(silhouette.mask, np.ones((2 * round(WITHIN_PX) + 1,) * 2, np.uint8))
@@ -180,7 +197,7 @@ def _held_against_outline(
     count = fan.least_missing(in_view & (core[down, across] > 0))
     if count > MOST_MISSING_INSIDE * (count + len(dots)):
         return found
-    return with_outline(found, silhouette, smooth, noise)
+    return with_outline(found, silhouette, picture.smooth, picture.noise)
 
 
 def _share_missing(found: Found, dots: Array, places: Array, fan: Fan, in_view: NDArray[np.bool_]) -> float:
